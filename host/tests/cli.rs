@@ -272,3 +272,49 @@ fn a_press_in_newtons_is_the_contact_that_hertz_tells() {
     // As measured: 76.48 kPa in the middle conduct (76.476 / 80.901)^3 S/m2, of which two fifths are left over the disc of 19.614 mm2; its radius is sqrt(4 / 7) of Hertz's.
     assert_eq!(rows(&["--contact", "2,3,1.888814,6.627302e-6"]), rows(&["--press", "2,3,8,1"]));
 }
+
+/// Names of the patches that a skin's detectors were told by, in their order, and how it ended.
+fn patches_of(skin: &str) -> (Vec<String>, Option<i32>, String) {
+    let output = TACTOMO.run(&["live", "--skin", skin, "--seconds", "0.5", "--json"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let of = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap();
+    let told = text.lines().map(of).filter(|line| line["frames"].as_u64() > Some(50));
+    let mut names: Vec<_> = told.map(|line| line["patch"].as_str().unwrap().to_owned()).collect();
+    names.sort_unstable();
+    (names, output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn the_detectors_of_a_skin_are_shown_each_by_its_name() {
+    let (names, code, messages) = patches_of(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml"));
+    assert_eq!((names.join(" "), code), ("index little middle ring thumb".to_owned(), Some(0)), "{messages}");
+}
+
+#[test]
+fn a_stream_of_several_detectors_names_each_and_keeps_the_order_of_its_times() {
+    let (folder, skin) = (Folder::new("several"), concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml"));
+    let stream = folder.path("hand.jsonl");
+    let output = TACTOMO.run(&["live", "--skin", skin, "--seconds", "0.5", "--json", "--stream", &stream]);
+    assert_eq!(output.status.code(), Some(0));
+    let text = std::fs::read_to_string(&stream).unwrap();
+    let mut times = std::collections::BTreeMap::<String, Vec<f64>>::new();
+    for line in text.lines() {
+        let line: serde_json::Value = serde_json::from_str(line).unwrap();
+        let patch = line["patch"].as_str().unwrap().to_owned();
+        times.entry(patch).or_default().push(line["time_s"].as_f64().unwrap());
+    }
+    let names: Vec<_> = times.keys().map(String::as_str).collect();
+    assert_eq!(names, ["index", "little", "middle", "ring", "thumb"]);
+    assert!(times.values().all(|times| times.len() > 50 && times.is_sorted()));
+}
+
+#[test]
+fn a_patch_that_fails_is_named_and_harms_no_other() {
+    let folder = Folder::new("skin");
+    let text = "[[patch]]\nname = \"lame\"\nport = \"/dev/null\"\n[[patch]]\nname = \"sound\"\nsimulate = true\n";
+    let (names, code, messages) = patches_of(&folder.with("skin.toml", text));
+    assert_eq!((names, code), (vec!["sound".to_owned()], Some(1)), "{messages}");
+    assert!(messages.contains("patch lame") && messages.contains("/dev/null"), "{messages}");
+    let (_, code, messages) = patches_of("no/such.toml");
+    assert!(code == Some(1) && messages.contains("no/such.toml"), "{messages}");
+}

@@ -8,8 +8,8 @@ use anyhow::{Context, Result, ensure};
 
 /// Set where a missing tool must not pass for a success.
 const SKIP_NOTHING: &str = "TACTOMO_SKIP_NOTHING";
-/// What builds and tests the package, beside what it needs itself.
-const TOOLS: [&str; 4] = ["maturin>=1.9,<2", "mypy>=1.15", "numpy>=1.23", "pytest>=7"];
+/// What builds and tests the package, and what it has views for.
+const TOOLS: [&str; 6] = ["maturin>=1.9,<2", "mypy>=1.15", "numpy>=1.23", "pandas>=2", "pytest>=7", "xarray>=2024"];
 /// Whether this Python can make virtual environments, and is one that the wheel is for.
 const CHECK: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))";
 

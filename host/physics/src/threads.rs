@@ -26,21 +26,12 @@ pub fn leave_a_core() {
 
 /// What a function makes of each, in their order, on at most so many threads.
 pub fn map_on<T: Sync, R: Send>(cores: usize, all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    work(cores, all, &AtomicBool::new(false), &|_| {}, function).into_iter().flatten().collect()
+    map_until(cores, all, &AtomicBool::new(false), &|_| {}, function).into_iter().flatten().collect()
 }
 
-/// What a function makes of each, in their order, on all cores until `stop` is set: `None` of what was not begun by then. `done` gets, on any of
-/// the threads, how many are done.
+/// What a function makes of each, in their order, on at most so many threads until `stop` is set: `None` of what was not begun by then. `done`
+/// gets, on any of the threads, this one among them, how many are done.
 pub fn map_until<T: Sync, R: Send>(
-    all: &[T],
-    stop: &AtomicBool,
-    done: &(dyn Fn(usize) + Sync),
-    function: impl Fn(&T) -> R + Sync,
-) -> Vec<Option<R>> {
-    work(cores(), all, stop, done, function)
-}
-
-fn work<T: Sync, R: Send>(
     cores: usize,
     all: &[T],
     stop: &AtomicBool,
@@ -95,7 +86,7 @@ mod tests {
             most.fetch_max(count, Ordering::Relaxed);
             stop.store(count >= 10, Ordering::Relaxed);
         };
-        let found = map_until(&all, &stop, &done, |value| *value);
+        let found = map_until(cores(), &all, &stop, &done, |value| *value);
         let there: Vec<_> = found.iter().flatten().copied().collect();
         assert_eq!(there, (0..there.len()).collect::<Vec<_>>());
         assert!((10..900).contains(&there.len()) && most.load(Ordering::Relaxed) == there.len(), "{}", there.len());

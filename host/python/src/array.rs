@@ -28,13 +28,20 @@ pub fn of_array(array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Readings> {
         [count] => count.isqrt(),
         _ => 0,
     };
-    let shape = || view.shape().iter().map(usize::to_string).collect::<Vec<_>>().join(" x ");
     Readings::new(electrodes, volts).ok_or_else(|| {
         refused(format!(
             "an array of {} is no frame: `electrodes x electrodes` readings (V) are needed, a row for each grounded electrode",
-            shape()
+            sides(view.shape())
         ))
     })
+}
+
+/// The shape of an array in words: `16 x 15`.
+pub fn sides(shape: &[usize]) -> String {
+    if shape.is_empty() {
+        return "one number".to_owned();
+    }
+    shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ")
 }
 
 /// Numbers as an array `(rows, columns)`, without a copy of them; `columns` divides their number.

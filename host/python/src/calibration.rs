@@ -1,16 +1,10 @@
 //! `Calibration`: from the detector on paper to the one that was built.
 
-use std::fs::File;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
-
-use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use tactomo::calibrate::{Frame, Rub, RubSettings, Step, rub};
 use tactomo::date::today;
 use tactomo::detector::{CalibratedParameter, Calibration as Found, Detector as Described};
 
-use crate::array;
 use crate::detector::Detector;
 use crate::error::{raised, refused};
 use crate::given;
@@ -80,9 +74,10 @@ impl Calibration {
         presses: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
-        let mut frames: Vec<Frame> =
-            given::frames(readings)?.into_iter().map(|readings| Frame { readings, known_m: None }).collect();
-        array::require_volts(frames.iter().map(|frame| &frame.readings), &detector.0)?;
+        let mut frames: Vec<Frame> = given::frames(readings, &detector.0)?
+            .into_iter()
+            .map(|readings| Frame { readings, known_m: None })
+            .collect();
         for (index, x_m, y_m) in known {
             let count = frames.len();
             let frame = frames.get_mut(index);
@@ -117,19 +112,6 @@ impl Calibration {
     #[getter]
     fn detector(&self) -> Detector {
         Detector(self.detector.clone())
-    }
-
-    /// Writes the detector to a new TOML file, for `Detector(path)` and `--detector`, and the surface of a curved one beside it as OBJ; a file
-    /// that exists is not replaced.
-    fn save(&self, path: PathBuf) -> PyResult<()> {
-        let new = |path: &Path, text: &str| {
-            let named = |error| PyOSError::new_err(format!("cannot write {}: {error}", path.display()));
-            File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes())).map_err(named)
-        };
-        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let (text, surface) = self.detector.to_files(&stem);
-        new(&path, &text)?;
-        surface.map_or(Ok(()), |(name, obj)| new(&path.with_file_name(name), &obj))
     }
 
     /// Date of the calibration (ISO 8601).

@@ -10,6 +10,7 @@ use tactomo::simulate;
 
 use crate::array;
 use crate::error::raised;
+use crate::file::write_new;
 use crate::pickle::{Restored, restored};
 
 /// A detection layer with its electrodes and the circuit that measures it.
@@ -51,6 +52,15 @@ impl Detector {
     /// This detector as the text of a TOML file.
     fn to_toml(&self) -> String {
         self.0.to_toml()
+    }
+
+    /// Writes it to a new TOML file, for `Detector(path)` and `--detector`, and the surface of a curved one beside it as OBJ; a file
+    /// that exists is not replaced.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let (text, surface) = self.0.to_files(&stem);
+        write_new(&path, text.as_bytes())?;
+        surface.map_or(Ok(()), |(name, obj)| write_new(&path.with_file_name(name), obj.as_bytes()))
     }
 
     /// A detector as it may have been built by this description: each quantity off by its tolerance, drawn with `seed`. It is what a

@@ -1,11 +1,11 @@
 //! Errors of the library as Python's exceptions, with the same words.
 
 use std::error::Error;
-use tactomo::causes::with_causes;
 
 use pyo3::PyErr;
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
+use tactomo::causes::with_causes;
 
 create_exception!(
     tactomo,
@@ -16,7 +16,13 @@ create_exception!(
 
 /// The exception for an error and what caused it.
 pub fn raised(error: impl Error) -> PyErr {
-    TactomoError::new_err(with_causes(&error))
+    refused(in_python(&with_causes(&error)))
+}
+
+/// The program's words, with its options as the arguments that they are here.
+pub fn in_python(words: &str) -> String {
+    let options = [("`--port`", "`port`"), ("`--simulate`", "`simulate=True`"), ("`--detector`", "`detector`")];
+    options.into_iter().fold(words.to_owned(), |words, (option, argument)| words.replace(option, argument))
 }
 
 /// The exception with these words.

@@ -1,11 +1,14 @@
-//! `Contact`, `forward` and `Simulator`: from what presses to readings.
+//! `Contact`, `Model` and `Simulator`: from what presses to readings.
 
+use std::ffi::CString;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use numpy::PyArray2;
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use tactomo::detector::Detector as Described;
 use tactomo::forward::{Auto, ForwardError, ForwardModel, readings_v, touched_impedance_ohm};
+use tactomo::hertz::Hertz;
 use tactomo::nalgebra::DMatrix;
 use tactomo::readings::Readings;
 use tactomo::scene::{Contact as Disc, Touch};
@@ -37,6 +40,36 @@ impl Contact {
     #[pyo3(signature = (x_m, y_m, radius_m, conductance_s, z_m = 0.0))]
     fn new(x_m: f64, y_m: f64, radius_m: f64, conductance_s: f64, z_m: f64) -> Self {
         Self { x_m, y_m, z_m, radius_m, conductance_s }
+    }
+
+    /// The contact under a ball of `radius_m` (m) that is pressed on a detector with `force_n` (N): by Hertz's theory and what the detector's file
+    /// says of its foam and surface (docs/detector.md, `[skin]`). Warns where the theory ends.
+    #[staticmethod]
+    #[pyo3(signature = (detector, x_m, y_m, radius_m, force_n, *, z_m = 0.0))]
+    fn ball(
+        py: Python<'_>,
+        detector: &Detector,
+        x_m: f64,
+        y_m: f64,
+        radius_m: f64,
+        force_n: f64,
+        z_m: f64,
+    ) -> PyResult<Self> {
+        if !(radius_m > 0.0 && force_n > 0.0 && radius_m.is_finite() && force_n.is_finite()) {
+            return Err(refused("radius_m and force_n: numbers above zero are needed"));
+        }
+        let skin = detector.0.skin.ok_or_else(|| {
+            refused(format!(
+                "forces need to know how soft {} is: take detector.in_material(\"A\"), or write young_pa in a table [skin] of its file",
+                detector.0.name
+            ))
+        })?;
+        let imprint = Hertz::new(&detector.0, skin).map_err(raised)?.ball(radius_m, force_n);
+        if let Some(beyond) = imprint.beyond {
+            let warning = CString::new(format!("{force_n} N is beyond Hertz's theory: {beyond}"))?;
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &warning, 1)?;
+        }
+        Ok(Self { x_m, y_m, z_m, radius_m: imprint.half_width_m, conductance_s: imprint.conductance_s })
     }
 
     /// What it is made of again, for pickle and copies.
@@ -90,31 +123,61 @@ pub fn array<'py>(py: Python<'py>, readings: &Readings) -> PyResult<Bound<'py, P
     square(py, readings.volts().to_vec(), readings.electrodes())
 }
 
-/// Readings of a detector under contacts (V), `(n, n)`: `readings[g][e]` is electrode `e` while `g` is grounded. Without noise, by the
-/// model that solvers invert: to try a solver, take a `Simulator`, whose model is another and finer one. With no contacts all are zero.
+/// The model of a detector that solvers invert: made once, in milliseconds to seconds, and then asked as often as need be.
 ///
-/// `contacts` are `Contact`s, rows of `x_m, y_m, radius_m, conductance_s` (an array `(contacts, 4)`), or touches of any shape: mappings as
-/// `tactomo forward --json` prints them.
-///
-/// >>> forward(Detector(), [Contact(0.009, -0.006, 0.003, 2e-4)]).shape
+/// >>> Model(Detector()).forward([Contact(0.009, -0.006, 0.003, 2e-4)]).shape
 /// (16, 16)
-#[pyfunction]
-pub fn forward<'py>(
-    py: Python<'py>,
-    detector: &Detector,
-    contacts: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (touches, detector) = (touches(contacts)?, &detector.0);
-    let readings = py.detach(|| readings_under(detector, &touches)).map_err(raised)?;
-    array(py, &readings)
+#[pyclass(frozen, module = "tactomo")]
+pub struct Model {
+    detector: Described,
+    model: Box<dyn ForwardModel>,
 }
 
-fn readings_under(detector: &Described, touches: &[Touch]) -> Result<Readings, ForwardError> {
-    if touches.is_empty() {
-        return Ok(Readings::from_fn(detector.electrodes.len(), |_, _| 0.0));
+#[pymethods]
+impl Model {
+    #[new]
+    fn new(py: Python<'_>, detector: &Detector) -> PyResult<Self> {
+        let detector = detector.0.clone();
+        let Auto { model, .. } = py.detach(|| Auto::new(&detector, None)).map_err(raised)?;
+        Ok(Self { detector, model })
     }
-    let Auto { model, .. } = Auto::new(detector, None)?;
-    Ok(readings_v(&touched_impedance_ohm(&*model, touches)?, detector))
+
+    /// What it is made of again, for pickle and copies.
+    fn __getnewargs__(&self) -> (Detector,) {
+        (self.detector(),)
+    }
+
+    /// The detector.
+    #[getter]
+    fn detector(&self) -> Detector {
+        Detector(self.detector.clone())
+    }
+
+    /// Which model it is: `slab` or `shell`.
+    #[getter]
+    fn name(&self) -> &'static str {
+        self.model.name()
+    }
+
+    /// Readings under contacts (V), `(n, n)`: `readings[g][e]` is electrode `e` while `g` is grounded. Without noise: to try a solver, take a
+    /// `Simulator`, whose model is another and finer one. With no contacts all are zero.
+    ///
+    /// `contacts` are `Contact`s, rows of `x_m, y_m, radius_m, conductance_s` (an array `(contacts, 4)`), or touches of any shape: mappings
+    /// as `tactomo forward --json` prints them.
+    fn forward<'py>(&self, py: Python<'py>, contacts: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let touches = touches(contacts)?;
+        let readings = py.detach(|| {
+            Ok(match impedance_ohm(&*self.model, &touches)? {
+                Some(impedance_ohm) => readings_v(&impedance_ohm, &self.detector),
+                None => Readings::from_fn(self.detector.electrodes.len(), |_, _| 0.0),
+            })
+        });
+        array(py, &readings.map_err(|error: ForwardError| raised(error))?)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Model({:?}: {})", self.detector.name, self.model.name())
+    }
 }
 
 /// A board that measures a detector under contacts: a model finer than any that solvers invert, wires and their faults, a converter.
@@ -146,7 +209,7 @@ impl Simulator {
         Detector(self.detector.clone())
     }
 
-    /// Voltages at the converter in the next frame (V), `(n, n)`: without its noise. `contacts` as for `forward`; none is a frame at rest.
+    /// Voltages at the converter in the next frame (V), `(n, n)`: without its noise. `contacts` as for `Model.forward`; none is a frame at rest.
     #[pyo3(signature = (contacts = None), text_signature = "($self, contacts=())")]
     fn voltages<'py>(
         &self,
@@ -156,7 +219,7 @@ impl Simulator {
         self.frame(py, contacts, Measurement::pad_voltages)
     }
 
-    /// The next frame as the converter gives it (V), `(n, n)`: with its noise and in its steps. `contacts` as for `forward`; none is a
+    /// The next frame as the converter gives it (V), `(n, n)`: with its noise and in its steps. `contacts` as for `Model.forward`; none is a
     /// frame at rest.
     #[pyo3(signature = (contacts = None), text_signature = "($self, contacts=())")]
     fn readings<'py>(

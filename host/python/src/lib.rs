@@ -7,15 +7,20 @@ mod array;
 mod calibration;
 mod detector;
 mod error;
+mod file;
 mod forward;
 mod given;
 mod json;
+mod known;
+mod learned;
 mod live;
 mod mesh;
 mod pickle;
 mod recording;
 mod solution;
+mod solutions;
 mod solver;
+mod views;
 
 use pyo3::prelude::*;
 
@@ -29,7 +34,11 @@ mod _tactomo {
     #[pymodule_export]
     use super::error::TactomoError;
     #[pymodule_export]
-    use super::forward::{Contact, Simulator, forward};
+    use super::forward::{Contact, Model, Simulator};
+    #[pymodule_export]
+    use super::known::{Correction, ForceLaw};
+    #[pymodule_export]
+    use super::learned::{Learned, learn};
     #[pymodule_export]
     use super::live::{Live, TouchEvent};
     #[pymodule_export]
@@ -38,6 +47,8 @@ mod _tactomo {
     use super::recording::{Frame, Frames, Recording};
     #[pymodule_export]
     use super::solution::{Flags, FoundContact, Shape, Solution, Total};
+    #[pymodule_export]
+    use super::solutions::Solutions;
     #[pymodule_export]
     use super::solver::Solver;
 

@@ -124,7 +124,7 @@ impl Recording {
 
     /// All frames as arrays: `{time_s (frames,), sequence (frames,), lost_before (frames,), readings_v (frames, n, n), used_v (frames, n, n)}`;
     /// readings as measured and as they are used.
-    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    pub fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = py.detach(|| -> PyResult<All> {
             let mut all = All::default();
             let mut frames = self.frames()?;
@@ -251,7 +251,7 @@ impl Frame {
 impl Frame {
     /// Board time since the first frame (s).
     #[getter]
-    fn time_s(&self) -> f64 {
+    pub fn time_s(&self) -> f64 {
         self.time_s
     }
 

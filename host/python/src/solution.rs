@@ -1,6 +1,6 @@
 //! `Solution` and what it is made of; names are those of the one schema, [`tactomo::schema`].
 
-use numpy::{PyArray1, PyArrayDescr, PyUntypedArray};
+use numpy::{PyArray1, PyArrayDescr, PyArrayMethods, PyUntypedArray};
 use pyo3::IntoPyObjectExt;
 use pyo3::PyClass;
 use pyo3::prelude::*;
@@ -41,6 +41,12 @@ impl Solution {
     pub fn new(py: Python<'_>, mut answer: Answer) -> Self {
         let image = answer.image_s_per_m2.take().map(|image| PyArray1::from_vec(py, image).unbind());
         Self { answer, image }
+    }
+
+    /// The answer again, with a copy of its image.
+    pub fn answer(&self, py: Python<'_>) -> PyResult<Answer> {
+        let image = self.image.as_ref().map(|image| image.bind(py).to_vec()).transpose()?;
+        Ok(Answer { image_s_per_m2: image, ..self.answer.clone() })
     }
 }
 
@@ -171,15 +177,20 @@ pub fn contacts<'py>(py: Python<'py>, found: &[FoundDisc]) -> PyResult<Bound<'py
 
 /// Contacts as a structured array.
 pub fn contact_array<'py>(py: Python<'py>, found: &[FoundDisc]) -> PyResult<Bound<'py, PyAny>> {
+    let values = found.iter().flat_map(|contact| CONTACT_COLUMNS.iter().map(|column| column.value(contact)));
+    let values: Vec<f64> = values.map(|value| value.unwrap_or(f64::NAN)).collect();
+    let array: Bound<'_, PyUntypedArray> = PyArray1::from_vec(py, values).cast_into()?;
+    array.call_method1("view", (contact_dtype(py)?,))
+}
+
+/// The fields of a contact, all float64.
+pub fn contact_dtype(py: Python<'_>) -> PyResult<Bound<'_, PyArrayDescr>> {
     static DTYPE: PyOnceLock<Py<PyArrayDescr>> = PyOnceLock::new();
     let named = || {
         let fields: Vec<_> = CONTACT_COLUMNS.iter().map(|column| (column.name, "f8")).collect();
         PyArrayDescr::new(py, fields).map(Bound::unbind)
     };
-    let values = found.iter().flat_map(|contact| CONTACT_COLUMNS.iter().map(|column| column.value(contact)));
-    let values: Vec<f64> = values.map(|value| value.unwrap_or(f64::NAN)).collect();
-    let array: Bound<'_, PyUntypedArray> = PyArray1::from_vec(py, values).cast_into()?;
-    array.call_method1("view", (DTYPE.get_or_try_init(py, named)?.bind(py),))
+    Ok(DTYPE.get_or_try_init(py, named)?.bind(py).clone())
 }
 
 /// A contact that was found. Its attributes are the fields of `tactomo.CONTACT_FIELDS`; `None` where not known.

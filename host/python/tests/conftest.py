@@ -1,5 +1,7 @@
 """What several tests press."""
 
+import signal
+
 import pytest
 import tactomo
 
@@ -13,6 +15,11 @@ def detector():
 
 
 @pytest.fixture(scope="session")
+def model(detector):
+    return tactomo.Model(detector)
+
+
+@pytest.fixture(scope="session")
 def simulator(detector):
     return tactomo.Simulator(detector)
 
@@ -21,3 +28,11 @@ def simulator(detector):
 def readings(simulator):
     """A light press with the converter's noise (V)."""
     return simulator.readings([PRESS])
+
+
+@pytest.fixture
+def ctrl_c():
+    """Python's own answer to SIGINT, which it does not set where it was started with SIGINT ignored, as in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

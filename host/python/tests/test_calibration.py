@@ -46,14 +46,14 @@ def test_a_rub_finds_the_detector_that_was_built(tmp_path):
     assert calibration.presses == 12 and calibration.touched == (30, 30) and calibration.residual < 2
     assert 0 < calibration.place_error_m < 2e-3 and calibration.left_out == []
     path = tmp_path / "calibrated.toml"
-    calibration.save(path)
+    calibration.detector.save(path)
     read = tactomo.Detector(path).calibration
     assert read.residual is None
     for name, (error, is_prior) in calibration.parameters.items():
         # Four digits are written.
         assert read.parameters[name] == (pytest.approx(error, rel=1e-3), is_prior)
     with pytest.raises(OSError, match="exists"):
-        calibration.save(path)
+        calibration.detector.save(path)
 
 
 def test_a_rub_stops_when_told_and_says_what_is_wrong():

@@ -107,7 +107,7 @@ def test_stop_ends_an_iteration_in_another_thread():
 
 def test_what_is_learned_is_kept_for_the_next_time(tmp_path):
     kept = tmp_path / "mine.learned.toml"
-    options = {"simulate": True, "as_built": 3, "learned": kept}
+    options = {"simulate": True, "as_built": 3, "kept": kept}
     with tactomo.Live(seconds=90, **options) as run:
         while not kept.exists() and run.next(1.0):
             pass
@@ -120,26 +120,26 @@ def test_what_is_learned_is_kept_for_the_next_time(tmp_path):
 
 
 @pytest.fixture
-def ctrl_c():
-    """Python's own answer to SIGINT, which it does not set where it was started with SIGINT ignored, as in the background."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="a silent board needs a pseudo-terminal")
-@pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_ends_the_wait_for_a_silent_board():
+def silent_port():
+    """A serial port on which no board answers."""
+    if not hasattr(os, "openpty"):
+        pytest.skip("a silent board needs a pseudo-terminal")
     board, port = os.openpty()
-    try:
-        with tactomo.Live(os.ttyname(port), solver="tikhonov") as run:
-            assert run.next(0.05) is None and run.link in ("searching", "waiting")
-            threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
-            with pytest.raises(KeyboardInterrupt):
-                next(run)
-    finally:
-        os.close(board)
-        os.close(port)
+    yield os.ttyname(port)
+    os.close(board)
+    os.close(port)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_ends_the_wait_for_a_silent_board(silent_port):
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt), tactomo.Live(silent_port, solver="tikhonov"):
+        pass
+
+
+def test_a_board_that_does_not_answer_fails_where_it_is_opened(silent_port):
+    with pytest.raises(tactomo.TactomoError, match=f"{silent_port}: no board said Hello .* is the board flashed"), tactomo.Live(silent_port, solver="tikhonov"):
+        pytest.fail("it has opened")
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_ctrl_c_ends_the_wait_for_a_silent_board():
         ({"simulate": True, "queue": 0}, "room for one"),
         ({"simulate": True, "port": "COM1"}, "one of port, simulate and replay"),
         ({"simulate": True, "seconds": -1.0}, "seconds"),
-        ({"simulate": True, "learn": False, "learned": "mine.learned.toml"}, "learned: nothing is learned"),
+        ({"simulate": True, "learn": False, "kept": "mine.learned.toml"}, "kept: no detector is learned"),
         ({"replay": "not-there.tactomo"}, "cannot open the recording not-there.tactomo"),
     ],
 )
@@ -164,8 +164,24 @@ def test_wrong_options_say_what_is_allowed(options, words):
         tactomo.Live(**options)
 
 
-def test_a_port_that_is_not_there_is_named():
-    with tactomo.Live("/dev/not-there", solver="tikhonov") as run, pytest.raises(tactomo.TactomoError, match="/dev/not-there"):
-        next(run)
+def test_a_port_that_is_not_there_fails_where_it_is_opened():
+    run = tactomo.Live("/dev/not-there", solver="tikhonov")
+    with pytest.raises(tactomo.TactomoError, match="/dev/not-there"), run:
+        pytest.fail("it has opened")
     with pytest.raises(tactomo.TactomoError, match="`with` statement"):
         next(tactomo.Live(simulate=True))
+
+
+def test_a_detector_that_the_board_does_not_fit_fails_where_it_is_opened(tmp_path):
+    path = tmp_path / "touch.tactomo"
+    with live(record=path, seconds=0.2) as run:
+        assert sum(1 for _ in run) > 0
+    wrong = tactomo.Live(replay=path, detector=tactomo.Detector("display-140x70").taken_as_exact(), solver="tikhonov")
+    words = "scans 16 electrodes, but the detector display-140x70 has 32: choose the detector that is connected with `detector`"
+    with pytest.raises(tactomo.TactomoError, match=words), wrong:
+        pytest.fail("it has opened")
+
+
+def test_the_first_event_is_there_once_it_is_open():
+    with live() as run:
+        assert run.link == "streaming" and run.next(0.0) is not None

@@ -89,6 +89,15 @@ def test_solutions_come_back_as_they_were(name, readings):
     assert all(getattr(again(contact), field) == getattr(contact, field) for field in tactomo.CONTACT_FIELDS)
 
 
+@pytest.mark.parametrize("name", ["contacts", "tikhonov"])
+def test_solutions_of_many_frames_come_back_as_they_were(name, detector, readings):
+    found = tactomo.Solver(name, detector).solve_many([readings, 0 * readings])
+    back = again(found)
+    assert back.array.tobytes() == found.array.tobytes() and back.flags.tobytes() == found.flags.tobytes()
+    assert all(same(one, other) for one, other in zip(back, found, strict=True)) and len(list(back)) == 2
+    assert back.images is None or np.array_equal(back.images, found.images)
+
+
 def test_a_shape_comes_back_as_it_was_and_faults_too(simulator, detector):
     line = {"line": {"length_m": 0.03, "width_m": 0.003, "angle_rad": 0.5}}
     touch = {"centre_m": [0.002, -0.003], "shape": line, "conductance_s": 1e-3}

@@ -33,6 +33,23 @@ def test_a_recording_has_frames_and_its_detector(path):
     assert np.array_equal(arrays["time_s"], [frame.time_s for frame in frames])
 
 
+def test_a_recording_is_a_dataset_with_times(path):
+    pytest.importorskip("xarray")
+    recording = tactomo.Recording(path)
+    dataset, arrays = recording.to_xarray(), recording.arrays()
+    assert dataset["readings_v"].dims == ("frame", "ground", "electrode") and dataset["time_s"].dims == ("frame",)
+    assert np.array_equal(dataset["used_v"].values, arrays["used_v"])
+    in_the_middle = dataset.where(dataset["time_s"] > arrays["time_s"][10], drop=True)
+    assert in_the_middle.sizes["frame"] == len(arrays["time_s"]) - 11
+
+
+def test_a_recording_is_solved_in_one_call(path):
+    recording = tactomo.Recording(path)
+    found = tactomo.Solver("contacts", recording.detector).solve_many(recording.less_baseline(), in_sequence=True)
+    solver = tactomo.Solver("contacts", recording.detector)
+    assert all(one.array.tobytes() == solver.solve(frame).array.tobytes() for one, frame in zip(found, recording.less_baseline(), strict=True))
+
+
 def test_a_recording_is_solved_less_its_baseline(path):
     recording = tactomo.Recording(path)
     solver = tactomo.Solver("contacts", recording.detector)

@@ -1,4 +1,5 @@
 import json
+import pickle
 import threading
 
 import numpy as np
@@ -7,17 +8,26 @@ import tactomo
 from conftest import PRESS
 
 
-def test_forward_is_a_frame_that_a_press_raises_below_it(detector):
-    volts = tactomo.forward(detector, [PRESS])
+def test_forward_is_a_frame_that_a_press_raises_below_it(detector, model):
+    volts = model.forward([PRESS])
     assert volts.shape == (16, 16) and volts.dtype == np.float64
     assert (volts >= 0).all() and (volts < detector.drive_v).all()
     near = np.argmin(np.hypot(*(detector.electrodes_m[:, :2] - [PRESS.x_m, PRESS.y_m]).T))
     assert volts[0].argmax() == near
-    assert not tactomo.forward(detector, []).any()
+    assert not model.forward([]).any()
 
 
-def test_contacts_are_objects_rows_or_touches(detector):
-    of_objects = tactomo.forward(detector, [PRESS])
+def test_a_model_is_made_once_and_always_answers_the_same(detector, model):
+    volts = model.forward([PRESS])
+    model.forward([(0.0, 0.0, 0.01, 1.0)])
+    assert np.array_equal(model.forward([PRESS]), volts) and np.array_equal(tactomo.Model(detector).forward([PRESS]), volts)
+    assert model.name == "slab" and model.detector == detector
+    again = pickle.loads(pickle.dumps(model))
+    assert np.array_equal(again.forward([PRESS]), volts)
+
+
+def test_contacts_are_objects_rows_or_touches(model):
+    of_objects = model.forward([PRESS])
     row = [PRESS.x_m, PRESS.y_m, PRESS.radius_m, PRESS.conductance_s]
     touch = {
         "centre_m": [PRESS.x_m, PRESS.y_m],
@@ -25,17 +35,31 @@ def test_contacts_are_objects_rows_or_touches(detector):
         "conductance_s": PRESS.conductance_s,
     }
     for contacts in ([row], np.array([row]), [tuple(row)], [touch]):
-        assert np.array_equal(tactomo.forward(detector, contacts), of_objects)
+        assert np.array_equal(model.forward(contacts), of_objects)
     ring = {**touch, "shape": {"ring": {"radius_m": 0.01, "width_m": 0.002}}}
-    assert not np.allclose(tactomo.forward(detector, [ring]), of_objects)
+    assert not np.allclose(model.forward([ring]), of_objects)
     with pytest.raises(tactomo.TactomoError, match="contact 1: a Contact, four numbers"):
-        tactomo.forward(detector, [PRESS, "here"])
+        model.forward([PRESS, "here"])
     with pytest.raises(tactomo.TactomoError, match="contact 0 .*on the detector"):
-        tactomo.forward(detector, [tactomo.Contact(1.0, 0, 0.003, 1e-4)])
+        model.forward([tactomo.Contact(1.0, 0, 0.003, 1e-4)])
 
 
-def test_a_simulator_measures_with_noise_by_another_model(detector, simulator):
-    volts, exact = simulator.voltages([PRESS]), tactomo.forward(detector, [PRESS])
+def test_a_ball_in_newtons_is_a_contact_that_grows_with_the_force(detector):
+    light, firm = (tactomo.Contact.ball(detector, 0.01, -0.005, 0.008, force_n) for force_n in (0.1, 0.8))
+    # Hertz: radii go with the cube root of the force.
+    assert firm.radius_m == pytest.approx(2 * light.radius_m) and firm.conductance_s > 8 * light.conductance_s
+    assert (light.x_m, light.y_m) == (0.01, -0.005)
+    with pytest.warns(UserWarning, match="1000.* N is beyond Hertz's theory"):
+        tactomo.Contact.ball(detector, 0.0, 0.0, 0.008, 1000.0)
+    hard = tactomo.Detector.from_toml(detector.to_toml().split("[skin]")[0])
+    with pytest.raises(tactomo.TactomoError, match=r"how soft .* is: .*\[skin\]"):
+        tactomo.Contact.ball(hard, 0.0, 0.0, 0.008, 1.0)
+    with pytest.raises(tactomo.TactomoError, match="above zero"):
+        tactomo.Contact.ball(detector, 0.0, 0.0, 0.008, 0.0)
+
+
+def test_a_simulator_measures_with_noise_by_another_model(detector, model, simulator):
+    volts, exact = simulator.voltages([PRESS]), model.forward([PRESS])
     # The finer model differs, by less than models differ from independent ones: docs/validation.md.
     assert 0 < np.abs(volts - exact).max() < 0.012 * exact.max()
     noise_v = simulator.readings([PRESS]) - volts

@@ -1,5 +1,8 @@
 //! `tactomo live`: the live picture.
 
+mod skin;
+
+use std::panic::resume_unwind;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -16,11 +19,12 @@ use tactomo::learned::Learned;
 use tactomo::run::calibration::Learning;
 use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::{Listener, Request, Snapshot};
+use tactomo::run::{Listener, Snapshot};
 use tactomo::scene::SceneName;
+use tactomo::sink::Sinks;
 use tactomo::sink::address::Address;
 use tactomo::sink::door::{Door, Origin};
-use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
+use tactomo::sink::page::{Finger, Listen, PageSetup, Server, Shown};
 use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
 
@@ -50,9 +54,14 @@ const REQUESTS: usize = 64;
 ///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network
 ///   tactomo live --stream - --stream-hz 100 | python robot.py
 ///   tactomo live --foxglove --mcap touch.mcap       for Foxglove, live and afterwards
+///   tactomo live --skin hand.toml                   several detectors, each with its board, on one page
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
+    /// Shows several detectors, each with its board, on one page: a TOML file with a [[patch]] for each, that has a name and options of this
+    /// command
+    #[arg(long, value_name = "FILE", conflicts_with_all = skin::OF_ONE)]
+    pub skin: Option<PathBuf>,
     #[command(flatten)]
     pub board: BoardArgs,
     /// Plays a recording instead
@@ -81,7 +90,7 @@ pub struct Args {
 }
 
 /// What becomes of the bytes.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Solver and page")]
 pub struct PictureArgs {
     #[command(flatten)]
@@ -152,6 +161,19 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
+    let Some(path) = &args.skin else { return show(prepared(args)?) };
+    let of_patch = |(name, patch): (String, Args)| {
+        let PictureArgs { http_port, listen, allow_origin, no_open, json, .. } = args.picture.clone();
+        let picture = PictureArgs { http_port, listen, allow_origin, no_open, json, ..patch.picture };
+        let show = prepared(Args { picture, seconds: args.seconds, ..patch });
+        Ok((name.clone(), show.with_context(|| format!("patch {name} of {}", path.display()))?))
+    };
+    let shows = skin::read(path)?.into_iter().map(of_patch).collect::<anyhow::Result<_>>()?;
+    show_all(shows, Some(&args.streams))
+}
+
+/// What one detector is shown by.
+fn prepared(args: Args) -> anyhow::Result<Show> {
     let chosen = &args.picture.detector;
     let detector = match &args.replay {
         Some(path) => source::recorded_detector(chosen, path)?,
@@ -168,7 +190,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     let Args { mut picture, scan, seconds, record, streams, elf, .. } = args;
     scan.check(detector.electrodes.len()).map_err(|what| anyhow!("--scan {scan}: {what}"))?;
     picture.pointer |= is_pointer;
-    show(Show { source, finger, settings, scan, learning, detector, picture, seconds, record, streams, elf })
+    Ok(Show { source, finger, settings, scan, learning, detector, picture, seconds, record, streams, elf })
 }
 
 /// How the detector is learned, if it is.
@@ -199,31 +221,96 @@ fn kept(learning: Option<&Learning>) -> Option<Detector> {
     })
 }
 
-/// Serves the page, or only counts, until the end.
-pub fn show(mut show: Show) -> anyhow::Result<()> {
-    let problem = problem(&show.picture, &show.detector)?;
+/// Serves the page of one detector, or only counts, until the end.
+pub fn show(show: Show) -> anyhow::Result<()> {
+    show_all(vec![(String::new(), show)], None)
+}
+
+/// A detector that is about to be shown.
+struct Begun {
+    /// Its name among several.
+    name: String,
+    source: Box<dyn Source>,
+    options: RunOptions,
+    ends: Ends,
+    sinks: Sinks,
+    /// Whether what it came to is told as JSON.
+    json: bool,
+}
+
+/// Serves the page of detectors, each by its name, or only counts, until the end. What ends one leaves the others as they are. `streams` have
+/// lines of all.
+fn show_all(shows: Vec<(String, Show)>, streams: Option<&StreamArgs>) -> anyhow::Result<()> {
     let stop = interrupt::flag()?;
-    let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
-    let (request, requests) = mpsc::sync_channel(REQUESTS);
+    let Some((_, Show { picture, seconds, .. })) = shows.first() else { return Ok(()) };
+    let (picture, has_end) = (picture.clone(), seconds.is_some());
     // Whatever cannot be is said before a page opens.
-    show.streams.check(show.picture.json)?;
-    let mut sinks = show.streams.begin(&problem, &show.source.name(), door(&show.picture), Arc::clone(&stop))?;
-    let options = options(&mut show, problem.clone(), sinks.listener())?;
-    let server = serve(&show, &problem, shown, request)?;
-    // The page may outlive the pipeline, so the snapshots have a sender here too.
-    let ends = Ends { snapshots: snapshots.clone(), requests, stop: Arc::clone(&stop) };
-    let summary = tactomo::run::run(&mut *show.source, options, ends)?;
-    if sinks.reader_is_gone() {
-        // As quietly as `head` ends.
-        return Ok(sinks.finish()?);
+    let begun = shows.into_iter().map(|(name, show)| begin(name, show, &stop)).collect::<anyhow::Result<Vec<_>>>()?;
+    let (mut begun, shown): (Vec<_>, Vec<_>) = begun.into_iter().unzip();
+    let mut of_all = Sinks::new(Arc::clone(&stop));
+    if let Some(streams) = streams {
+        streams.check(picture.json)?;
+        of_all = streams.begin_lines(Arc::clone(&stop))?;
     }
-    let ended = sinks.finish();
-    report(&summary, show.picture.json)?;
-    ended?;
-    if server.is_some() && show.seconds.is_none() {
+    let listeners = of_all.listeners(begun.iter().map(|begun| begun.name.as_str()));
+    begun.iter_mut().zip(listeners).for_each(|(begun, listener)| begun.options.listeners.extend(listener));
+    // The page may outlive the pipelines, so the snapshots have senders here too.
+    let _outlive: Vec<_> = begun.iter().map(|begun| begun.ends.snapshots.clone()).collect();
+    let server = serve(&picture, shown)?;
+    let ended: Vec<_> = thread::scope(|scope| {
+        let runs: Vec<_> = begun.into_iter().map(|begun| scope.spawn(|| one(begun, &of_all))).collect();
+        runs.into_iter().map(|run| run.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
+    });
+    let streamed = of_all.finish();
+    ended.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
+    streamed?;
+    if server.is_some() && !has_end {
         wait(&stop);
     }
     Ok(())
+}
+
+/// Makes one detector ready to be shown.
+fn begin(name: String, mut show: Show, stop: &Arc<AtomicBool>) -> anyhow::Result<(Begun, Shown)> {
+    let problem = problem(&show.picture, &show.detector)?;
+    let (snapshots, newest) = watch::channel(Arc::new(Snapshot::default()));
+    let (request, requests) = mpsc::sync_channel(REQUESTS);
+    show.streams.check(show.picture.json)?;
+    let mut sinks = show.streams.begin(&problem, &show.source.name(), door(&show.picture), Arc::clone(stop))?;
+    let setup = PageSetup {
+        detector: show.detector.clone(),
+        mesh: problem.jacobian.image_mesh.clone(),
+        usual_radius_m: ContactSettings::of(&problem).radius_m,
+        source: show.source.name(),
+        finger: show.finger,
+    };
+    let options = options(&mut show, problem, sinks.listener())?;
+    let ends = Ends { snapshots, requests, stop: Arc::clone(stop) };
+    let shown = Shown { name: name.clone(), setup, snapshots: newest, requests: request };
+    Ok((Begun { name, source: show.source, options, ends, sinks, json: show.picture.json }, shown))
+}
+
+/// Shows one detector to its end, and says what that came to, unless whoever reads what it or all write has gone: then it ends as quietly as
+/// `head` does.
+fn one(begun: Begun, of_all: &Sinks) -> anyhow::Result<()> {
+    let Begun { name, mut source, options, ends, sinks, json } = begun;
+    let named = |error: anyhow::Error| if name.is_empty() { error } else { error.context(format!("patch {name}")) };
+    let summary = match tactomo::run::run(&mut *source, options, ends) {
+        Ok(summary) => summary,
+        Err(error) => {
+            let error = named(error.into());
+            if !name.is_empty() {
+                tracing::error!("{error:#}; the others go on");
+            }
+            return Err(error);
+        }
+    };
+    let is_left = sinks.reader_is_gone() || of_all.reader_is_gone();
+    let ended = sinks.finish();
+    if !is_left {
+        report(&name, &summary, json)?;
+    }
+    ended.map_err(|error| named(error.into()))
 }
 
 fn problem(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Problem> {
@@ -261,29 +348,17 @@ fn options(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>
 }
 
 /// The page, unless only the figures are wanted.
-fn serve(
-    show: &Show,
-    problem: &Problem,
-    snapshots: watch::Receiver<Arc<Snapshot>>,
-    requests: mpsc::SyncSender<Request>,
-) -> anyhow::Result<Option<Server>> {
-    if show.picture.json {
+fn serve(picture: &PictureArgs, all: Vec<Shown>) -> anyhow::Result<Option<Server>> {
+    if picture.json {
         return Ok(None);
     }
-    let setup = PageSetup {
-        detector: show.detector.clone(),
-        mesh: problem.jacobian.image_mesh.clone(),
-        usual_radius_m: ContactSettings::of(problem).radius_m,
-        source: show.source.name(),
-        finger: show.finger,
-    };
-    let PictureArgs { listen, http_port: port, no_open, .. } = &show.picture;
-    let door = door(&show.picture);
+    let PictureArgs { listen, http_port: port, no_open, .. } = picture;
+    let door = door(picture);
     let listen = match listen {
         Some(address) => Listen::at(address, door)?,
         None => Listen { address: None, port: *port, door },
     };
-    let server = Server::start(listen, setup, snapshots, requests)?;
+    let server = Server::start(listen, all)?;
     message!("live picture: {}", server.url());
     if let Some(url) = server.shared_url() {
         message!("on the network: {url}\nwho has this address can see the page and press its buttons");
@@ -309,11 +384,21 @@ fn wait(stop: &AtomicBool) {
     }
 }
 
-fn report(summary: &Summary, json: bool) -> anyhow::Result<()> {
+/// What the run of a detector came to, by the name that it has among several.
+#[derive(serde::Serialize)]
+struct NamedSummary<'a> {
+    #[serde(skip_serializing_if = "str::is_empty")]
+    patch: &'a str,
+    #[serde(flatten)]
+    summary: &'a Summary,
+}
+
+fn report(patch: &str, summary: &Summary, json: bool) -> anyhow::Result<()> {
     if json {
-        return Ok(output::print(&serde_json::to_string(summary)?)?);
+        return Ok(output::print(&serde_json::to_string(&NamedSummary { patch, summary })?)?);
     }
-    message!("{}", sentence(summary));
+    let of = if patch.is_empty() { String::new() } else { format!("{patch}: ") };
+    message!("{of}{}", sentence(summary));
     Ok(())
 }
 

@@ -54,8 +54,13 @@ impl StreamArgs {
         Ok(())
     }
 
-    /// Begins all of them. `stop` is set when whoever reads stdout has gone; `source` is where the bytes come from, and `door` lets pages in.
-    pub fn begin(&self, problem: &Problem, source: &str, door: Door, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
+    /// Whether a stream goes to stdout.
+    pub fn use_stdout(&self) -> bool {
+        self.stream.contains(&Target::Stdout)
+    }
+
+    /// Begins streams of lines alone, as `begin` does.
+    pub fn begin_lines(&self, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
         let mut sinks = Sinks::new(stop);
         let form = Form { fields: self.stream_fields.unwrap_or_default(), most_per_s: self.stream_hz };
         for target in &self.stream {
@@ -63,6 +68,12 @@ impl StreamArgs {
                 message!("stream: tcp:{at}");
             }
         }
+        Ok(sinks)
+    }
+
+    /// Begins all of them. `stop` is set when whoever reads stdout has gone; `source` is where the bytes come from, and `door` lets pages in.
+    pub fn begin(&self, problem: &Problem, source: &str, door: Door, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
+        let mut sinks = self.begin_lines(stop)?;
         if let Some(address) = &self.foxglove {
             let address = address.clone().unwrap_or(Address::local(foxglove::DEFAULT_PORT));
             let at = sinks.add_foxglove(&address, messages(problem), door)?;

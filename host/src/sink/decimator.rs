@@ -28,11 +28,6 @@ impl Decimator {
         Self { period_us, ..Self::default() }
     }
 
-    /// Whether there are fewer than all.
-    pub fn is_on(&self) -> bool {
-        self.period_us.is_some()
-    }
-
     /// Takes an event: gives it back if one is due.
     pub fn take(&mut self, event: Arc<TouchEvent>) -> Option<Due> {
         let Some(period_us) = self.period_us else {

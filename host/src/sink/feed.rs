@@ -1,8 +1,11 @@
 //! Events on their way from the follower to whoever takes them: streams, files, apps.
 //!
-//! The follower puts each event in once, and never waits. Each taker has a [`Tail`]: its own place in the same bounded queue. One that falls
+//! A follower puts each event in once, and never waits. Each taker has a [`Tail`]: its own place in the same bounded queue. One that falls
 //! behind loses events, its own and nobody else's; it counts them, and says so when it begins and at the end.
+//!
+//! Several detectors may share a feed: each of its events has the name of its detector, and what a taker knows of one it knows of that one alone.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,16 +25,21 @@ const MOST_BEHIND: usize = 512;
 /// Time without an event after which a taker is told that nothing comes.
 const QUIET: Duration = Duration::from_millis(100);
 
-/// Where the follower puts events. The tails end once it is dropped and they have taken what is left.
+/// An event of a detector by the name that it has among others; an empty one if it is alone.
+type Named = (Arc<str>, Arc<TouchEvent>);
+
+/// Where a follower puts events. The tails end once all copies are dropped and they have taken what is left.
+#[derive(Clone)]
 pub struct Feed {
-    events: broadcast::Sender<Arc<TouchEvent>>,
-    alive: watch::Sender<()>,
+    patch: Arc<str>,
+    events: broadcast::Sender<Named>,
+    alive: Arc<watch::Sender<()>>,
 }
 
 /// What opens [`Tail`]s while the [`Feed`] lasts.
 #[derive(Clone)]
 pub struct Taps {
-    events: broadcast::WeakSender<Arc<TouchEvent>>,
+    events: broadcast::WeakSender<Named>,
     alive: watch::Receiver<()>,
 }
 
@@ -46,10 +54,16 @@ pub enum Keeps {
 
 /// A taker's place in the queue.
 pub struct Tail {
-    events: broadcast::Receiver<Arc<TouchEvent>>,
+    events: broadcast::Receiver<Named>,
     keeps: Keeps,
-    decimator: Decimator,
+    most_per_s: Option<f64>,
     losses: Losses,
+    patches: BTreeMap<Arc<str>, Course>,
+}
+
+/// What a taker has got of one detector.
+struct Course {
+    decimator: Decimator,
     /// Frames lost by the link or the board until the event that was delivered last, if one was.
     lost: Option<u64>,
     changes: Changes,
@@ -67,6 +81,8 @@ struct Losses {
 /// An event, as a taker gets it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Delivery {
+    /// The name that the detector has among others; empty if it is alone.
+    pub patch: Arc<str>,
     /// What the frame gave.
     pub event: Arc<TouchEvent>,
     /// Frames that the link or the board have lost since the delivery before.
@@ -84,7 +100,7 @@ impl Delivery {
     pub fn at_once(event: TouchEvent, changes: &mut Changes) -> Self {
         let (lost_before, pointer_events) = (event.lost_before, event.pointer_events.clone());
         let changed = changes.take(&event.solution.contacts);
-        Self { event: Arc::new(event), lost_before, missed_before: 0, pointer_events, changed }
+        Self { patch: Arc::default(), event: Arc::new(event), lost_before, missed_before: 0, pointer_events, changed }
     }
 }
 
@@ -101,11 +117,16 @@ pub enum Next {
 
 impl Default for Feed {
     fn default() -> Self {
-        Self { events: broadcast::Sender::new(QUEUE), alive: watch::Sender::new(()) }
+        Self { patch: Arc::default(), events: broadcast::Sender::new(QUEUE), alive: Arc::new(watch::Sender::new(())) }
     }
 }
 
 impl Feed {
+    /// The same feed, for the events of a detector of such a name.
+    pub fn of(&self, patch: &str) -> Self {
+        Self { patch: patch.into(), ..self.clone() }
+    }
+
     /// What opens tails.
     pub fn taps(&self) -> Taps {
         Taps { events: self.events.downgrade(), alive: self.alive.subscribe() }
@@ -115,7 +136,7 @@ impl Feed {
 impl Listener for Feed {
     fn touched(&mut self, event: &Arc<TouchEvent>) {
         // It fails where nobody takes events at the moment.
-        let _ = self.events.send(Arc::clone(event));
+        let _ = self.events.send((Arc::clone(&self.patch), Arc::clone(event)));
     }
 }
 
@@ -124,8 +145,7 @@ impl Taps {
     pub fn open(&self, name: &str, keeps: Keeps, most_per_s: Option<f64>) -> Option<Tail> {
         let events = self.events.upgrade()?.subscribe();
         let losses = Losses { name: name.to_owned(), before: 0, all: 0 };
-        let (decimator, changes) = (Decimator::new(most_per_s), Changes::default());
-        Some(Tail { events, keeps, decimator, losses, lost: None, changes })
+        Some(Tail { events, keeps, most_per_s, losses, patches: BTreeMap::new() })
     }
 
     /// Waits until there is nothing more to come.
@@ -140,29 +160,44 @@ impl Tail {
         loop {
             self.catch_up();
             let due = match timeout(QUIET, self.events.recv()).await {
-                Ok(Ok(event)) => self.decimator.take(event),
+                Ok(Ok((patch, event))) => {
+                    self.course(&patch).decimator.take(event).map(|(event, did)| (patch, event, did))
+                }
                 Ok(Err(broadcast::error::RecvError::Lagged(count))) => {
                     self.losses.add(count);
                     None
                 }
-                Ok(Err(broadcast::error::RecvError::Closed)) => match self.decimator.held() {
+                Ok(Err(broadcast::error::RecvError::Closed)) => match self.held() {
                     Some(last) => Some(last),
                     None => return Next::End,
                 },
-                Err(_) => match self.decimator.held() {
+                Err(_) => match self.held() {
                     Some(newest) => Some(newest),
                     None => return Next::Quiet,
                 },
             };
-            if let Some((event, pointer_events)) = due {
-                return Next::Event(self.deliver(event, pointer_events));
+            if let Some((patch, event, pointer_events)) = due {
+                return Next::Event(self.deliver(patch, event, pointer_events));
             }
         }
     }
 
+    fn course(&mut self, patch: &Arc<str>) -> &mut Course {
+        let begun = || Course { decimator: Decimator::new(self.most_per_s), lost: None, changes: Changes::default() };
+        self.patches.entry(Arc::clone(patch)).or_insert_with(begun)
+    }
+
+    /// What waits of any detector, if something does.
+    fn held(&mut self) -> Option<(Arc<str>, Arc<TouchEvent>, Vec<PointerEvent>)> {
+        let of = |(patch, course): (&Arc<str>, &mut Course)| {
+            course.decimator.held().map(|(event, did)| (Arc::clone(patch), event, did))
+        };
+        self.patches.iter_mut().find_map(of)
+    }
+
     /// Whether nothing waits, or what waits need not come soon.
     pub fn is_drained(&self) -> bool {
-        self.decimator.is_on() || self.events.is_empty()
+        self.most_per_s.is_some() || self.events.is_empty()
     }
 
     /// Waits for what may take long: writing to a reader that stalls. What is lost meanwhile is counted, and said, while it is.
@@ -192,14 +227,14 @@ impl Tail {
         self.losses.add(skipped);
     }
 
-    fn deliver(&mut self, event: Arc<TouchEvent>, pointer_events: Vec<PointerEvent>) -> Delivery {
-        let lost = event.frame.lost;
+    fn deliver(&mut self, patch: Arc<str>, event: Arc<TouchEvent>, pointer_events: Vec<PointerEvent>) -> Delivery {
+        let (course, lost) = (self.course(&patch), event.frame.lost);
         // What was lost before the first is no matter of this taker's.
-        let before = self.lost.replace(lost).unwrap_or(lost.saturating_sub(event.lost_before));
+        let before = course.lost.replace(lost).unwrap_or(lost.saturating_sub(event.lost_before));
         let lost_before = lost.saturating_sub(before);
-        let changed = self.changes.take(&event.solution.contacts);
+        let changed = course.changes.take(&event.solution.contacts);
         let missed_before = std::mem::take(&mut self.losses.before);
-        Delivery { event, lost_before, missed_before, pointer_events, changed }
+        Delivery { patch, event, lost_before, missed_before, pointer_events, changed }
     }
 }
 
@@ -288,6 +323,35 @@ mod tests {
         });
         assert_eq!(all, [(vec![1, 2], vec![]), (vec![3], vec![2]), (vec![], vec![]), (vec![4], vec![3])]);
         assert_eq!(some, [(vec![1, 2], vec![]), (vec![4], vec![2])]);
+    }
+
+    #[test]
+    fn what_is_told_of_one_detector_is_no_matter_of_another_on_the_same_feed() {
+        let with = |sequence, lost, id| {
+            let contacts = vec![FoundContact { id: Some(id), ..FoundContact::default() }];
+            let event = TouchEvent::of(sequence, Solution { contacts, ..Solution::default() });
+            let frame = Frame { lost, board_time_us: 1000 * sequence, ..event.frame };
+            Arc::new(TouchEvent { frame, ..event })
+        };
+        let feed = Feed::default();
+        let tails = [None, Some(200.0)].map(|most_per_s| feed.taps().open("test", Keeps::All, most_per_s).unwrap());
+        let mut of = ["index", "thumb"].map(|patch| feed.of(patch));
+        drop(feed);
+        for sequence in 0..20 {
+            of[0].touched(&with(sequence, 0, 1));
+            of[1].touched(&with(sequence + 70_000, sequence, 2));
+        }
+        drop(of);
+        let [all, some] = tails.map(deliveries);
+        let of = |all: &[Delivery], patch: &str| -> Vec<(u64, u64, usize)> {
+            let of = all.iter().filter(|delivery| &*delivery.patch == patch);
+            of.map(|one| (one.event.frame.sequence, one.lost_before, one.changed.ended.len())).collect()
+        };
+        assert_eq!(of(&all, "index"), (0..20).map(|sequence| (sequence, 0, 0)).collect::<Vec<_>>());
+        let every: Vec<_> = (70_000..70_020).map(|sequence| (sequence, u64::from(sequence > 70_000), 0)).collect();
+        assert_eq!(of(&all, "thumb"), every);
+        assert_eq!(of(&some, "index"), [0, 5, 10, 15, 19].map(|sequence| (sequence, 0, 0)));
+        assert_eq!(of(&some, "thumb").iter().map(|(_, lost, _)| lost).sum::<u64>(), 19);
     }
 
     #[test]

@@ -45,6 +45,7 @@ impl Fields {
     /// What such a line has.
     pub fn of(self, delivery: &Delivery) -> FrameReport<'_> {
         let all = FrameReport {
+            patch: Some(&*delivery.patch).filter(|patch| !patch.is_empty()),
             lost_before: Some(delivery.lost_before),
             missed_before: Some(delivery.missed_before),
             events: &delivery.pointer_events,

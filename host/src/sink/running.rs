@@ -72,6 +72,12 @@ impl Sinks {
         self.feed.take().map(|feed| Box::new(feed) as Box<dyn Listener>)
     }
 
+    /// Who listens to detectors of such names for all of them; nobody if there are none.
+    pub fn listeners<'a>(&mut self, patches: impl Iterator<Item = &'a str>) -> Vec<Option<Box<dyn Listener>>> {
+        let feed = self.feed.take();
+        patches.map(|patch| Some(Box::new(feed.as_ref()?.of(patch)) as Box<dyn Listener>)).collect()
+    }
+
     /// Whether the run was ended because whoever reads its output has gone.
     pub fn reader_is_gone(&self) -> bool {
         self.ended.reader_is_gone.load(Ordering::Relaxed)

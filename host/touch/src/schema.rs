@@ -53,6 +53,9 @@ impl Serialize for SchemaVersion {
 pub struct FrameReport<'a> {
     /// Version of these fields.
     pub schema: SchemaVersion,
+    /// The name that the detector has among several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch: Option<&'a str>,
     /// Number of the frame in its file, from 0; of frames from a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame: Option<u64>,

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use tactomo_physics::threads::map_until;
+use tactomo_physics::threads::{cores, map_until};
 
 /// What a study tells while it runs, and what stops it.
 #[derive(Clone, Copy)]
@@ -50,7 +50,7 @@ impl<'a> Progress<'a> {
     /// A function of each of some things on all cores, in their order; `None` of what was not begun when it was stopped.
     pub fn map<T: Sync, R: Send>(&self, what: &str, all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<Option<R>> {
         let progress = Self { whole: self.whole.or(Some((0, all.len(), Instant::now()))), ..*self };
-        map_until(all, self.stop, &|done| progress.tell(what, done), function)
+        map_until(cores(), all, self.stop, &|done| progress.tell(what, done), function)
     }
 
     /// Tells that so much of this part is done, and what that was or is next.

@@ -15,7 +15,7 @@ use tactomo::run::options::{Ends, LiveError, RunOptions, Solving, Summary};
 use tactomo::run::{Snapshot, Statistics};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
 use tactomo::simulate::{Controls, Fault, Simulation, drawn};
-use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
+use tactomo::sink::page::{Finger, Listen, PageSetup, Server, Shown};
 use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
 
@@ -62,7 +62,8 @@ impl Live {
             source: "simulated board".to_owned(),
             finger: Some(Finger::from(touch(&hand, [0.0; 2], FIRMNESS)?)),
         };
-        let server = Server::start(Listen { port: Some(0), ..Listen::default() }, page, receiver.clone(), sender)?;
+        let server =
+            Server::start(Listen { port: Some(0), ..Listen::default() }, Shown::alone(page, receiver.clone(), sender))?;
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
         let board = SimulatedBoard::simulate(built, simulation, Options::default())?;

@@ -25,6 +25,15 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// What the headers say follows them, as text.
+    pub fn body(mut self) -> Result<String> {
+        let of = |line: &str| line.to_ascii_lowercase().strip_prefix("content-length: ").map(str::to_owned);
+        let length: usize = self.headers.lines().find_map(of).context("a length")?.trim().parse()?;
+        let mut body = vec![0; length];
+        self.stream.read_exact(&mut body)?;
+        Ok(String::from_utf8(body)?)
+    }
+
     /// The stream behind the headers; what of it was read already is lost.
     pub fn stream(self) -> TcpStream {
         self.stream.into_inner()
@@ -73,8 +82,13 @@ pub struct RawPage {
 impl RawPage {
     /// Opens the socket as the page itself would.
     pub fn open(port: u16) -> Result<Self> {
+        Self::open_at(port, "/socket")
+    }
+
+    /// Opens the socket at `path` as the page beside it would.
+    pub fn open_at(port: u16, path: &str) -> Result<Self> {
         let host = format!("127.0.0.1:{port}");
-        let answer = ask_socket(port, &host, Some(&format!("http://{host}")))?;
+        let answer = ask_socket_at(port, path, &host, Some(&format!("http://{host}")))?;
         ensure!(answer.status == 101, "the server answers {}", answer.status);
         Ok(Self { stream: answer.stream, holds: false })
     }

@@ -12,7 +12,7 @@ use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
 use tactomo::run::{Arrival, Frame, LinkState, Request, Snapshot, TouchEvent};
-use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
+use tactomo::sink::page::{Finger, Listen, PageSetup, Server, Shown};
 use tactomo::solve::{FoundContact, Solution};
 use tokio::sync::watch;
 
@@ -46,7 +46,7 @@ impl Script {
             source: "a scripted board".to_owned(),
             finger: Some(FINGER),
         };
-        let server = Server::start(Listen { port: Some(0), ..Listen::default() }, setup, receiver, ask)?;
+        let server = Server::start(Listen { port: Some(0), ..Listen::default() }, Shown::alone(setup, receiver, ask))?;
         let first = Snapshot { link: LinkState::Streaming, ..Snapshot::default() };
         let snapshot = Arc::new(Mutex::new(first));
         let (sequence, stop) = (Arc::<AtomicU64>::default(), Arc::<AtomicBool>::default());

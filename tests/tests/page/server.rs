@@ -14,7 +14,7 @@ use tactomo::readings::Readings;
 use tactomo::run::{Request, Snapshot};
 use tactomo::scene::Contact;
 use tactomo::sink::door::{Door, Limits};
-use tactomo::sink::page::{Finger, Listen, PageSetup, Server, ServerError};
+use tactomo::sink::page::{Finger, Listen, PageSetup, Server, ServerError, Shown};
 use tactomo::solve::{Method, Solution};
 use tokio::sync::watch;
 
@@ -53,7 +53,7 @@ impl Rig {
     fn listening(listen: Listen, finger: Option<Finger>) -> Result<Self> {
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
-        let server = Server::start(listen, setup(finger)?, receiver, sender)?;
+        let server = Server::start(listen, Shown::alone(setup(finger)?, receiver, sender))?;
         Ok(Self { server, snapshots, requests })
     }
 
@@ -339,11 +339,37 @@ fn only_a_shared_page_has_an_address_for_others() -> Result<()> {
 }
 
 #[test]
+fn several_detectors_have_a_page_and_a_socket_each_and_one_with_all() -> Result<()> {
+    let (_snapshots, receiver) = watch::channel(Arc::default());
+    let of = |name: &str, requests| -> Result<Shown> {
+        let setup = PageSetup { source: format!("the board of {name}"), ..setup(Some(FINGER))? };
+        Ok(Shown { name: name.to_owned(), setup, snapshots: receiver.clone(), requests })
+    };
+    let [(thumb, of_thumb), (palm, of_palm)] = [sync_channel(4), sync_channel(4)];
+    let server = Server::start(local(Some(0)), vec![of("thumb", thumb)?, of("palm", palm)?])?;
+    let host = format!("127.0.0.1:{}", server.port());
+    let get = |path: &str| ask(server.port(), path, &host, &[]);
+    let of_all = |path: &str| anyhow::Ok(get(path)?.body()?.contains("detectors.js"));
+    assert!(of_all("/")? && !of_all("/thumb/")?);
+    assert_eq!(get("/detectors.json")?.body()?, r#"["thumb","palm"]"#);
+    let paths = [("/thumb", 308), ("/thumb/app.js", 200), ("/palm/socket", 400), ("/style.css", 200), ("/index/", 404)];
+    for (path, status) in paths {
+        assert_eq!(get(path)?.status, status, "{path}");
+    }
+    let mut page = RawPage::open_at(server.port(), "/palm/socket")?;
+    assert!(matches!(page.hear()?, Heard::Text(text) if text.contains("the board of palm")));
+    page.say("\"rezero\"")?;
+    assert_eq!(of_palm.recv_timeout(Duration::from_secs(5))?, Request::Rezero);
+    assert!(of_thumb.try_recv().is_err());
+    Ok(())
+}
+
+#[test]
 fn a_busy_port_is_named_and_the_default_gives_way() -> Result<()> {
     let rig = Rig::start(None)?;
     let start = |port| {
         let (_, receiver) = watch::channel(Arc::default());
-        Server::start(local(port), setup(None)?, receiver, sync_channel(1).0).map_err(anyhow::Error::from)
+        Server::start(local(port), Shown::alone(setup(None)?, receiver, sync_channel(1).0)).map_err(anyhow::Error::from)
     };
     let error = start(Some(rig.server.port())).err().context("a busy port")?;
     assert!(matches!(error.downcast_ref(), Some(ServerError::Busy { port, .. }) if *port == rig.server.port()));

@@ -65,11 +65,8 @@ def test_a_buffer_keeps_samples_until_it_is_taken():
 def test_what_is_wrong_is_raised():
     with pytest.raises(ValueError, match="touch. or .contacts"):
         skin(values="colours")
-    reader = TactomoSkin("/dev/not-there")
-    reader.start()
     with pytest.raises(tactomo.TactomoError, match="/dev/not-there"):
-        reader.get_data()
-    reader.join()
+        TactomoSkin("/dev/not-there").start()
 
 
 def test_it_has_the_methods_of_anyskin():

@@ -67,7 +67,10 @@ class TactomoCamera(Camera):
         self._raster = tactomo.Solver(config.solver, detector).mesh.raster(self.width or 64, self.height or 64)
         self._image, self._error, self._is_new, self._taken_s = None, None, False, 0.0
         live = tactomo.Live(config.port, simulate=config.simulate, detector=detector, solver=config.solver)
-        live.__enter__()
+        try:
+            live.__enter__()
+        except tactomo.TactomoError as error:
+            raise ConnectionError(f"{self}: {error}") from error
         self._live = live
         self._thread = threading.Thread(target=self._run, args=(live,), name="tactomo camera", daemon=True)
         self._thread.start()

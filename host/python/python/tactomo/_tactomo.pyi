@@ -10,13 +10,17 @@ __all__ = [
     "CONTACT_FIELDS",
     "Calibration",
     "Contact",
+    "Correction",
     "Detector",
     "Flags",
+    "ForceLaw",
     "FoundContact",
     "Frame",
     "Frames",
+    "Learned",
     "Live",
     "Mesh",
+    "Model",
     "Raster",
     "Recording",
     "SCENES",
@@ -24,12 +28,13 @@ __all__ = [
     "Shape",
     "Simulator",
     "Solution",
+    "Solutions",
     "Solver",
     "TactomoError",
     "Total",
     "TouchEvent",
     "__version__",
-    "forward",
+    "learn",
 ]
 
 _SolverName: TypeAlias = Literal[
@@ -75,6 +80,7 @@ CONTACT_FIELDS: tuple[str, ...]
 _Path: TypeAlias = str | PathLike[str]
 _Contacts: TypeAlias = Iterable[Contact | Sequence[float] | Mapping[str, Any]] | NDArray[np.floating[Any]]
 _Readings: TypeAlias = ArrayLike | Frame | TouchEvent
+_Frames: TypeAlias = NDArray[np.floating[Any]] | Iterable[_Readings]
 
 class TactomoError(ValueError): ...
 
@@ -87,6 +93,7 @@ class Detector:
     @staticmethod
     def presets() -> list[str]: ...
     def to_toml(self) -> str: ...
+    def save(self, path: _Path) -> None: ...
     def as_built(self, seed: int) -> Detector: ...
     def in_material(self, material: str) -> Detector: ...
     def taken_as_exact(self) -> Detector: ...
@@ -119,13 +126,12 @@ class Calibration:
     @staticmethod
     def rub(
         detector: Detector,
-        readings: NDArray[np.floating[Any]] | Iterable[_Readings],
+        readings: _Frames,
         *,
         known: Sequence[tuple[int, float, float]] = (),
         presses: int = 160,
         progress: Callable[[int, float], bool | None] | None = None,
     ) -> Calibration: ...
-    def save(self, path: _Path) -> None: ...
     @property
     def detector(self) -> Detector: ...
     @property
@@ -150,11 +156,95 @@ class Calibration:
     def left_out(self) -> list[int] | None: ...
 
 @final
+class Correction:
+    @staticmethod
+    def of_presses(
+        detector: Detector, readings: _Frames, places_m: ArrayLike, *, force_n: ArrayLike | None = None
+    ) -> Correction: ...
+    @property
+    def detector(self) -> Detector: ...
+    @property
+    def corrects_places(self) -> bool: ...
+    @property
+    def corrects_conductances(self) -> bool | None: ...
+    @property
+    def before_m(self) -> NDArray[np.float64]: ...
+    @property
+    def left_out_m(self) -> NDArray[np.float64]: ...
+    @property
+    def sigma_left_out_m(self) -> NDArray[np.float64]: ...
+    @property
+    def kept(self) -> int: ...
+    @property
+    def skipped(self) -> list[tuple[int, int]]: ...
+
+@final
+class ForceLaw:
+    @staticmethod
+    def of_presses(
+        detector: Detector,
+        readings: _Frames,
+        force_n: ArrayLike,
+        *,
+        unloading: ArrayLike | None = None,
+        time_s: ArrayLike | None = None,
+        law: Literal["power", "saturating"] | None = None,
+    ) -> ForceLaw: ...
+    @property
+    def detector(self) -> Detector: ...
+    @property
+    def law(self) -> Literal["power", "saturating"]: ...
+    @property
+    def parameters(self) -> dict[str, tuple[float | None, float | None]]: ...
+    @property
+    def maximum_force_n(self) -> tuple[float, float | None] | None: ...
+    @property
+    def scatter(self) -> float: ...
+    @property
+    def hysteresis(self) -> float: ...
+    @property
+    def left_out(self) -> list[int]: ...
+
+@final
+class Learned:
+    def __new__(cls, path: _Path) -> Self: ...
+    def save(self, path: _Path) -> None: ...
+    def solve(self, readings: ArrayLike) -> Solution: ...
+    @property
+    def solver(self) -> Literal["kernel", "network"]: ...
+    @property
+    def channels(self) -> int: ...
+    @property
+    def presses(self) -> int | None: ...
+    @property
+    def left_out_m(self) -> float | None: ...
+    @property
+    def middle_m(self) -> float | None: ...
+    @property
+    def strength(self) -> Literal["force_n", "depth_m", "conductance_s"] | None: ...
+    @property
+    def left_out_strength_share(self) -> float | None: ...
+
+def learn(
+    readings: _Frames,
+    places_m: ArrayLike,
+    *,
+    detector: Detector | None = None,
+    force_n: ArrayLike | None = None,
+    depth_m: ArrayLike | None = None,
+    conductance_s: ArrayLike | None = None,
+) -> Learned: ...
+
+@final
 class Contact:
     __hash__: ClassVar[None]  # type: ignore[assignment]
     def __new__(
         cls, x_m: float, y_m: float, radius_m: float, conductance_s: float, z_m: float = 0.0
     ) -> Self: ...
+    @staticmethod
+    def ball(
+        detector: Detector, x_m: float, y_m: float, radius_m: float, force_n: float, *, z_m: float = 0.0
+    ) -> Contact: ...
     @property
     def x_m(self) -> float: ...
     @property
@@ -166,7 +256,14 @@ class Contact:
     @property
     def conductance_s(self) -> float: ...
 
-def forward(detector: Detector, contacts: _Contacts) -> NDArray[np.float64]: ...
+@final
+class Model:
+    def __new__(cls, detector: Detector) -> Self: ...
+    def forward(self, contacts: _Contacts) -> NDArray[np.float64]: ...
+    @property
+    def detector(self) -> Detector: ...
+    @property
+    def name(self) -> Literal["slab", "shell"]: ...
 
 @final
 class Simulator:
@@ -180,12 +277,16 @@ class Simulator:
 class Solver:
     def __new__(
         cls,
-        name: _SolverName = "auto",
+        name: _SolverName | None = None,
         detector: Detector | None = None,
         *,
         lambda_: float | Literal["discrepancy", "l-curve", "gcv"] | None = None,
+        learned: Learned | None = None,
     ) -> Self: ...
     def solve(self, readings: _Readings) -> Solution: ...
+    def solve_many(
+        self, frames: _Frames, cores: int | None = None, *, in_sequence: bool = False
+    ) -> Solutions: ...
     def reset(self) -> None: ...
     @property
     def name(self) -> _SolverName: ...
@@ -240,6 +341,27 @@ class Solution:
     @property
     def calibrated_m(self) -> tuple[float, float] | None: ...
     def to_json(self) -> str: ...
+
+@final
+class Solutions:
+    def __len__(self) -> int: ...
+    def __getitem__(self, key: int, /) -> Solution: ...
+    def __iter__(self) -> Iterator[Solution]: ...
+    @property
+    def count(self) -> NDArray[np.int64]: ...
+    @property
+    def array(self) -> NDArray[np.void]: ...
+    @property
+    def residual(self) -> NDArray[np.float64]: ...
+    @property
+    def certainty(self) -> NDArray[np.float64]: ...
+    @property
+    def flags(self) -> NDArray[np.void]: ...
+    @property
+    def images(self) -> NDArray[np.float32] | None: ...
+    # pandas and xarray need not be installed.
+    def to_pandas(self) -> Any: ...
+    def to_xarray(self) -> Any: ...
 
 @final
 class FoundContact:
@@ -361,6 +483,7 @@ class Recording:
     def __iter__(self) -> Frames: ...
     def less_baseline(self, rest: int | None = None) -> Frames: ...
     def arrays(self) -> dict[str, NDArray[Any]]: ...
+    def to_xarray(self) -> Any: ...
     def damage(self) -> str | None: ...
     @property
     def detector(self) -> Detector: ...
@@ -430,7 +553,8 @@ class Live:
         port: str | None = None,
         *,
         detector: Detector | None = None,
-        solver: _SolverName = "auto",
+        solver: _SolverName | None = None,
+        learned: Learned | None = None,
         seconds: float | None = None,
         queue: int = 4096,
         simulate: bool = False,
@@ -443,7 +567,7 @@ class Live:
         speed: float = 1.0,
         record: _Path | None = None,
         learn: bool = True,
-        learned: _Path | None = None,
+        kept: _Path | None = None,
         scan: str = "whole",
         settle_us: int | None = None,
         average: int | None = None,

@@ -2,42 +2,37 @@
 
 mod event;
 mod queue;
+mod running;
 mod source;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
-use std::thread::{self, JoinHandle};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 use tactomo::board::link::Control;
 use tactomo::board::link::serial::DEFAULT_BAUD;
-use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::RequestedSettings;
-use tactomo::causes::with_causes;
 use tactomo::changes::Changes;
-use tactomo::detector::Detector as Described;
 use tactomo::run::calibration::Learning;
-use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::{LinkState, Request, Snapshot, TouchEvent as Answered};
+use tactomo::run::{LinkState, Request, TouchEvent as Answered};
 use tactomo::scene::SceneName;
-use tactomo::solve::{Method, Problem};
-use tokio::sync::watch;
 
 pub use self::event::TouchEvent;
-use self::queue::{Ended, Next, Queue, Tail};
+use self::queue::{Next, Queue};
+use self::running::{Running, Wanted};
 use self::source::{Chosen, Simulated};
 use crate::detector::Detector;
-use crate::error::{raised, refused};
+use crate::error::{in_python, raised, refused};
 use crate::forward::touches;
 use crate::json;
+use crate::learned::Learned;
+use crate::solver::chosen;
 
 /// Longest wait before it is asked whether somebody has pressed Ctrl-C.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Requests that may wait.
-const REQUESTS: usize = 64;
 
 /// The events of a board, as they come: a context manager, and an iterator that ends with the run.
 ///
@@ -46,8 +41,9 @@ const REQUESTS: usize = 64;
 /// `replay` plays a recording, `speed` times as fast. `record` keeps every byte in a new file. `settle_us`, `average` (1, 2, 4 ... 256 conversions),
 /// `max_frames_per_s`, `select_us` and `discard` are asked of the board, and `scan`: `whole`, `four`, `adaptive`, or a list of grounds such as `"0,5,10,15"`.
 ///
-/// The detector of a board is learned from what presses on it, and used once that helps, unless `learn` is false. The file `learned` keeps that for
-/// the next time; what it holds is used from the start.
+/// The detector of a board is learned from what presses on it, and used once that helps, unless `learn` is false. The file `kept` keeps that for
+/// the next time; what it holds is used from the start. `learned` is what known presses on the sensor have taught (`Learned`), as for `Solver`;
+/// then the detector is taken as described.
 ///
 /// Up to `queue` events wait; if more come, the oldest are lost and counted in `lost`: a slow loop never slows the board.
 ///
@@ -56,54 +52,32 @@ const REQUESTS: usize = 64;
 /// ...         print(event.time_s, event.contacts)
 #[pyclass(frozen, module = "tactomo")]
 pub struct Live {
-    source: Chosen,
-    detector: Described,
-    method: Method,
-    scan: ScanChoice,
-    settings: RequestedSettings,
-    seconds: Option<Duration>,
-    record: Option<PathBuf>,
-    learning: Option<Learning>,
+    wanted: Wanted,
     queue: Arc<Queue>,
     changes: Mutex<Changes>,
     has_begun: AtomicBool,
     running: Mutex<Option<Running>>,
 }
 
-/// A run under way.
-struct Running {
-    stop: Arc<AtomicBool>,
-    requests: mpsc::SyncSender<Request>,
-    snapshots: watch::Receiver<Arc<Snapshot>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        // Whatever ended it is in the queue.
-        let _ = self.thread.take().map(JoinHandle::join);
-    }
-}
-
 #[pymethods]
 impl Live {
     #[new]
     #[pyo3(signature = (
-        port = None, *, detector = None, solver = "auto", seconds = None, queue = 4096, simulate = false, scene = None, board = None,
-        faults = None, seed = None, as_built = None, replay = None, speed = 1.0, record = None, learn = true, learned = None, scan = "whole", settle_us = None, average = None,
+        port = None, *, detector = None, solver = None, learned = None, seconds = None, queue = 4096, simulate = false, scene = None, board = None,
+        faults = None, seed = None, as_built = None, replay = None, speed = 1.0, record = None, learn = true, kept = None, scan = "whole", settle_us = None, average = None,
         max_frames_per_s = None, select_us = None, discard = None, baud = DEFAULT_BAUD
     ))]
     #[pyo3(
-        text_signature = "(port=None, *, detector=None, solver='auto', seconds=None, queue=4096, simulate=False, scene=None, board=None, \
-        faults=None, seed=None, as_built=None, replay=None, speed=1.0, record=None, learn=True, learned=None, scan='whole', settle_us=None, average=None, \
+        text_signature = "(port=None, *, detector=None, solver=None, learned=None, seconds=None, queue=4096, simulate=False, scene=None, board=None, \
+        faults=None, seed=None, as_built=None, replay=None, speed=1.0, record=None, learn=True, kept=None, scan='whole', settle_us=None, average=None, \
         max_frames_per_s=None, select_us=None, discard=None, baud=921600)"
     )]
     #[allow(clippy::too_many_arguments)]
     fn new(
         port: Option<String>,
         detector: Option<&Detector>,
-        solver: &str,
+        solver: Option<&str>,
+        learned: Option<&Learned>,
         seconds: Option<f64>,
         queue: usize,
         simulate: bool,
@@ -116,7 +90,7 @@ impl Live {
         speed: f64,
         record: Option<PathBuf>,
         learn: bool,
-        learned: Option<PathBuf>,
+        kept: Option<PathBuf>,
         scan: &str,
         settle_us: Option<u16>,
         average: Option<u16>,
@@ -149,12 +123,14 @@ impl Live {
             (port, false, None) => Chosen::Board { port, baud },
             _ => return Err(refused("give one of port, simulate and replay")),
         };
-        if learned.is_some() && (!learn || source.is_replay()) {
-            return Err(refused("learned: nothing is learned of a recording, or with learn=False"));
+        let learned = learned.map(|learned| learned.taught.clone());
+        let learns = learn && learned.is_none() && !source.is_replay();
+        if kept.is_some() && !learns {
+            return Err(refused("kept: no detector is learned of a recording, with learn=False, or by learned"));
         }
         let detector = source.detector(detector.map(|detector| detector.0.clone()))?;
-        let learning = Learning::of(&detector, None).filter(|_| learn && !source.is_replay());
-        let learning = learning.map(|learning| Learning { file: learned, ..learning });
+        let learning = Learning::of(&detector, None).filter(|_| learns);
+        let learning = learning.map(|learning| Learning { file: kept, ..learning });
         let scan: ScanChoice = scan.parse().map_err(|error: String| refused(format!("scan: {error}")))?;
         scan.check(detector.electrodes.len()).map_err(|error| refused(format!("scan: {error}")))?;
         let seconds = seconds.map(|seconds| {
@@ -163,8 +139,9 @@ impl Live {
         if queue == 0 {
             return Err(refused("queue: room for one event at least is needed"));
         }
-        Ok(Self {
-            method: solver.parse().map_err(raised)?,
+        let wanted = Wanted {
+            method: chosen(solver, learned.as_ref())?,
+            learned,
             scan,
             settings: RequestedSettings {
                 settle_us,
@@ -176,20 +153,28 @@ impl Live {
             seconds: seconds.transpose()?,
             record,
             learning,
+            source,
+            detector,
+        };
+        Ok(Self {
+            wanted,
             queue: Arc::new(Queue::new(queue)),
             changes: Mutex::default(),
             has_begun: AtomicBool::new(false),
             running: Mutex::new(None),
-            source,
-            detector,
         })
     }
 
-    /// Starts the run.
+    /// Starts the run, and waits for its first event: a port that does not open, a board that does not answer or does not fit the detector
+    /// fail here.
     fn __enter__(slf: Bound<'_, Self>) -> PyResult<Bound<'_, Self>> {
         let live = slf.get();
         slf.py().detach(|| live.start())?;
-        Ok(slf)
+        let begun = live.await_first(slf.py());
+        if begun.is_err() {
+            live.stop(slf.py());
+        }
+        begun.map(|()| slf)
     }
 
     /// Ends it.
@@ -270,13 +255,13 @@ impl Live {
     /// The detector that the events are of.
     #[getter]
     fn detector(&self) -> Detector {
-        Detector(self.detector.clone())
+        Detector(self.wanted.detector.clone())
     }
 
     /// How the link to the board fares: `searching`, `waiting`, `streaming`, or in words what is wrong.
     #[getter]
     fn link(&self) -> String {
-        match self.running().as_ref().map(|running| running.snapshots.borrow().link.clone()) {
+        match self.running().as_ref().map(Running::link) {
             None => "not running".to_owned(),
             Some(LinkState::Searching) => "searching".to_owned(),
             Some(LinkState::Waiting) => "waiting".to_owned(),
@@ -288,7 +273,7 @@ impl Live {
     /// What to know of the baseline, in words; `None` if all is well.
     #[getter]
     fn notice(&self) -> Option<String> {
-        self.running().as_ref().and_then(|running| running.snapshots.borrow().baseline.clone())
+        self.running().as_ref().and_then(|running| running.notice())
     }
 
     /// What a run that has ended has come to, as `tactomo live --json` prints it; `None` before.
@@ -307,38 +292,27 @@ impl Live {
     }
 
     fn start(&self) -> PyResult<()> {
-        let mut running = self.running();
-        if self.has_begun.load(Ordering::Relaxed) {
+        if self.has_begun.swap(true, Ordering::Relaxed) {
             return Err(refused("this Live has run: make another one"));
         }
-        let mut source = self.source.open(&self.detector)?;
-        let kept = self.learning.as_ref().map(Learning::kept).transpose().map_err(refused)?.flatten();
-        let detector = kept.unwrap_or_else(|| self.detector.clone());
-        let problem = Problem::of(&detector).map_err(raised)?;
-        let record = |path: &PathBuf| Recorder::create(path, &Header::now(&detector, source.name()));
-        let options = RunOptions {
-            recorder: self.record.as_ref().map(record).transpose().map_err(raised)?,
-            settings: self.settings,
-            scan: self.scan.clone(),
-            solving: Some(Solving { learning: self.learning.clone(), ..Solving::new(self.method, problem) }),
-            listeners: vec![Box::new(Tail(Arc::clone(&self.queue)))],
-            seconds: self.seconds,
-            ..RunOptions::new(detector)
-        };
-        let stop = Arc::new(AtomicBool::new(false));
-        let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
-        let (request, requests) = mpsc::sync_channel(REQUESTS);
-        let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
-        let queue = Arc::clone(&self.queue);
-        let work = move || {
-            let run = std::panic::AssertUnwindSafe(|| tactomo::run::run(&mut *source, options, ends));
-            queue.end(ended(std::panic::catch_unwind(run)));
-        };
-        let thread = thread::Builder::new().name("tactomo".to_owned()).spawn(work);
-        let thread = Some(thread.map_err(|error| refused(format!("cannot start a thread: {error}")))?);
-        self.has_begun.store(true, Ordering::Relaxed);
-        *running = Some(Running { stop, requests: request, snapshots: shown, thread });
+        let running = self.wanted.start(&self.queue);
+        self.has_begun.store(running.is_ok(), Ordering::Relaxed);
+        *self.running() = Some(running?);
         Ok(())
+    }
+
+    /// Waits until there is an event; what keeps the run from giving one is an error.
+    fn await_first(&self, py: Python<'_>) -> PyResult<()> {
+        while !py.detach(|| self.queue.has_begun(LOOK_EVERY)) {
+            py.check_signals()?;
+            if let Some(LinkState::Silent(why) | LinkState::Lost(why)) = self.running().as_ref().map(Running::link) {
+                return Err(refused(in_python(&why)));
+            }
+        }
+        match self.queue.ended() {
+            Some(Err(why)) => Err(refused(why)),
+            _ => Ok(()),
+        }
     }
 
     /// The next event, or `Some(None)` at the end; `None` if nothing came within `patience`.
@@ -367,17 +341,7 @@ impl Live {
 
     fn ask(&self, request: Request) -> PyResult<()> {
         let running = self.running();
-        let running = running.as_ref().ok_or_else(|| refused("nothing runs: use it in a `with` statement"))?;
-        running.requests.try_send(request).map_err(|_| refused("too many requests wait, or the run has ended"))
-    }
-}
-
-/// How a run has ended, in words.
-fn ended(run: thread::Result<Result<tactomo::run::options::Summary, tactomo::run::options::LiveError>>) -> Ended {
-    match run {
-        Ok(Ok(summary)) => serde_json::to_string(&summary).map_err(|error| error.to_string()),
-        Ok(Err(error)) => Err(with_causes(&error)),
-        Err(_) => Err("the run panicked: this is a mistake in tactomo, please report it".to_owned()),
+        running.as_ref().ok_or_else(|| refused("nothing runs: use it in a `with` statement"))?.ask(request)
     }
 }
 

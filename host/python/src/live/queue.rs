@@ -50,6 +50,12 @@ impl Queue {
         self.lock().ended.clone()
     }
 
+    /// Whether there is an answer, or the run has ended, within `patience`.
+    pub fn has_begun(&self, patience: Duration) -> bool {
+        let waited = self.changed.wait_timeout_while(self.lock(), patience, |state| state.is_empty());
+        !waited.unwrap_or_else(PoisonError::into_inner).0.is_empty()
+    }
+
     /// Says that there will be nothing more.
     pub fn end(&self, ended: Ended) {
         self.lock().ended = Some(ended);

@@ -9,9 +9,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
+use tactomo::calibrate::pressed::Solved;
 use tactomo::detector::Detector;
 
+use super::reconstruct::reader::Reader;
 use super::reconstruct::units::Unit;
 use super::record;
 use super::source::{self, BoardArgs};
@@ -91,6 +93,22 @@ pub struct Reading {
     /// Unit of the readings in a table [default: V]
     #[arg(long, value_name = "V|mV")]
     unit: Option<Unit>,
+}
+
+/// What the solver finds in all frames of a recording.
+fn solved(reader: &mut Reader) -> anyhow::Result<Vec<Solved>> {
+    let (mut frames, mut excluded) = (Vec::new(), Vec::new());
+    while let Some(frame) = reader.next_frame()? {
+        let time_s = frame.time_s.with_context(|| format!("{} has no time", reader.place()))?;
+        let solution = reader.solve(&frame).with_context(|| reader.place())?;
+        frames.push(Solved { time_s, contacts: solution.contacts });
+        excluded = solution.flags.excluded;
+    }
+    if !excluded.is_empty() {
+        let electrodes: Vec<_> = excluded.iter().map(usize::to_string).collect();
+        message!("warning: electrodes {} were left out, since they contradict the others", electrodes.join(", "));
+    }
+    Ok(frames)
 }
 
 /// Writes a detector, and beside it the surface of a curved one.

@@ -25,6 +25,7 @@ const ASSETS: &[Asset] = &[
     ("/colours.js", SCRIPT, include_str!("web/colours.js")),
     ("/contacts.js", SCRIPT, include_str!("web/contacts.js")),
     ("/controls.js", SCRIPT, include_str!("web/controls.js")),
+    ("/detectors.js", SCRIPT, include_str!("web/detectors.js")),
     ("/figures.js", SCRIPT, include_str!("web/figures.js")),
     ("/flat.js", SCRIPT, include_str!("web/flat.js")),
     ("/frame.js", SCRIPT, include_str!("web/frame.js")),
@@ -52,6 +53,7 @@ const ASSETS: &[Asset] = &[
     ("/strip.js", SCRIPT, include_str!("web/strip.js")),
     ("/svg.js", SCRIPT, include_str!("web/svg.js")),
     ("/target.js", SCRIPT, include_str!("web/target.js")),
+    ("/tile.js", SCRIPT, include_str!("web/tile.js")),
     ("/theme.js", SCRIPT, include_str!("web/theme.js")),
     ("/told.js", SCRIPT, include_str!("web/told.js")),
     ("/totals.js", SCRIPT, include_str!("web/totals.js")),
@@ -63,6 +65,17 @@ const ASSETS: &[Asset] = &[
     ("/vibration.js", SCRIPT, include_str!("web/vibration.js")),
     ("/words.js", SCRIPT, include_str!("web/words.js")),
 ];
+
+/// What the page of several detectors has in place of one's.
+const OF_ALL: &[Asset] = &[("/", HTML, include_str!("web/detectors.html"))];
+
+/// Answer to a request for `path` of the page of several detectors.
+pub(super) fn of_all(path: &str) -> Response {
+    match OF_ALL.iter().find(|asset| asset.0 == path) {
+        Some((_, kind, contents)) => response(StatusCode::OK, kind, contents),
+        None => answer(path),
+    }
+}
 
 /// Answer to a request for `path`.
 pub(super) fn answer(path: &str) -> Response {

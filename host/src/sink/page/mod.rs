@@ -45,6 +45,30 @@ const MAX_PAGES: usize = 32;
 /// Largest message that a page may send, in bytes.
 const MAX_PAGE_MESSAGE: usize = 2048;
 
+/// One detector to be shown: what does not change, what there is to show, and where pages' requests go. A request that finds no room is dropped.
+#[derive(Debug)]
+pub struct Shown {
+    /// Its name among others, which is part of the address of its page: letters, digits, `-` and `_`.
+    pub name: String,
+    /// What does not change.
+    pub setup: PageSetup,
+    /// The newest of what there is to show.
+    pub snapshots: watch::Receiver<Arc<Snapshot>>,
+    /// Where requests go.
+    pub requests: SyncSender<Request>,
+}
+
+impl Shown {
+    /// One that is shown alone, and needs no name.
+    pub fn alone(
+        setup: PageSetup,
+        snapshots: watch::Receiver<Arc<Snapshot>>,
+        requests: SyncSender<Request>,
+    ) -> Vec<Self> {
+        vec![Self { name: String::new(), setup, snapshots, requests }]
+    }
+}
+
 /// What does not change while the program runs.
 #[derive(Clone, Debug)]
 pub struct PageSetup {
@@ -159,32 +183,31 @@ pub enum ServerError {
     Token(getrandom::Error),
 }
 
-/// What all sockets share.
+/// What all sockets of a detector share.
+#[derive(Debug)]
+struct Picture {
+    shown: Shown,
+    setup_message: String,
+    rezeros: AtomicU64,
+    door: Door,
+}
+
+/// What all requests share.
 #[derive(Debug)]
 struct Shared {
-    setup: PageSetup,
-    setup_message: String,
-    snapshots: watch::Receiver<Arc<Snapshot>>,
-    requests: SyncSender<Request>,
-    rezeros: AtomicU64,
+    /// Those shown, each with a page of its own if they are several.
+    pictures: Vec<Arc<Picture>>,
     pages: Arc<Semaphore>,
     access: Access,
     door: Door,
 }
 
 impl Server {
-    /// Serves the page.
-    ///
-    /// Pages show the newest of `snapshots` and ask through `requests`; a request that finds `requests` full is dropped.
+    /// Serves the page of a detector; or of several a page with all of them, from which those of each are opened.
     ///
     /// # Errors
     /// If the port or the address is busy or refused.
-    pub fn start(
-        listen: Listen,
-        setup: PageSetup,
-        snapshots: watch::Receiver<Arc<Snapshot>>,
-        requests: SyncSender<Request>,
-    ) -> Result<Self, ServerError> {
+    pub fn start(listen: Listen, all: Vec<Shown>) -> Result<Self, ServerError> {
         let listener = bind(&listen)?;
         let (address, port) = (listen.ip(), listen.port.unwrap_or(DEFAULT_PORT));
         let refused = |source| ServerError::Listen { address, port, source };
@@ -194,12 +217,15 @@ impl Server {
             None => Access::local(at.port()),
         };
         let prefix = access.prefix();
-        let setup_message = wire::setup(&setup)
-            .map_err(|source| ServerError::PageSetup { detector: setup.detector.name.clone(), source })?;
-        let pages = Arc::new(Semaphore::new(MAX_PAGES));
-        let rezeros = AtomicU64::new(0);
-        let shared =
-            Arc::new(Shared { setup, setup_message, snapshots, requests, rezeros, pages, access, door: listen.door });
+        let picture = |shown: Shown| {
+            let name = || shown.setup.detector.name.clone();
+            let setup_message = wire::setup(&shown.setup, &shown.name)
+                .map_err(|source| ServerError::PageSetup { detector: name(), source })?;
+            Ok(Arc::new(Picture { shown, setup_message, rezeros: AtomicU64::new(0), door: listen.door.clone() }))
+        };
+        let pictures: Vec<_> = all.into_iter().map(picture).collect::<Result<_, _>>()?;
+        let pages = Arc::new(Semaphore::new(MAX_PAGES * pictures.len()));
+        let shared = Arc::new(Shared { pictures, pages, access, door: listen.door });
         let (stop, stopped) = oneshot::channel();
         let thread = run(listener, shared, stopped).map_err(refused)?;
         Ok(Self { at, prefix, stop: Some(stop), thread: Some(thread) })
@@ -302,13 +328,44 @@ fn refuse(why: &str) -> Response {
 }
 
 fn answer(shared: &Arc<Shared>, request: &mut web::Request, host: &str) -> Response {
-    let whole = request.uri().path();
-    match shared.access.path(whole) {
+    let whole = request.uri().path().to_owned();
+    match shared.access.path(&whole) {
         None => refuse("The token is missing or wrong: open the whole address that tactomo live printed.\n"),
         Some("") => redirect(&format!("{whole}/")),
-        Some("/socket") => open_socket(shared, request, host),
-        Some(path) => assets::answer(path),
+        Some(path) => match &shared.pictures[..] {
+            [only] => page(shared, only, request, (path, host)),
+            all => {
+                let mut parts = path.splitn(3, '/').skip(1);
+                let name = parts.next().unwrap_or_default();
+                match (all.iter().find(|picture| picture.shown.name == name), parts.next()) {
+                    (Some(_), None) => redirect(&format!("{whole}/")),
+                    (Some(picture), Some(rest)) => page(shared, picture, request, (&format!("/{rest}"), host)),
+                    (None, _) if path == "/detectors.json" => names(all),
+                    (None, _) => assets::of_all(path),
+                }
+            }
+        },
     }
+}
+
+/// The page of one detector.
+fn page(
+    shared: &Arc<Shared>,
+    picture: &Arc<Picture>,
+    request: &mut web::Request,
+    (path, host): (&str, &str),
+) -> Response {
+    match path {
+        "/socket" => open_socket(shared, picture, request, host),
+        path => assets::answer(path),
+    }
+}
+
+/// Names of all detectors, as JSON.
+fn names(all: &[Arc<Picture>]) -> Response {
+    let names: Vec<&str> = all.iter().map(|picture| picture.shown.name.as_str()).collect();
+    let json = serde_json::to_string(&names).unwrap_or_default();
+    response(StatusCode::OK, "application/json", &json)
 }
 
 /// The same page with a slash at its end: the names of its files are relative to that.
@@ -319,7 +376,7 @@ fn redirect(to: &str) -> Response {
     redirect
 }
 
-fn open_socket(shared: &Arc<Shared>, request: &mut web::Request, host: &str) -> Response {
+fn open_socket(shared: &Arc<Shared>, picture: &Arc<Picture>, request: &mut web::Request, host: &str) -> Response {
     let Ok(switching) = web::switching(request) else {
         return response(StatusCode::BAD_REQUEST, PLAIN, "This is the page's socket: open the page.\n");
     };
@@ -329,9 +386,9 @@ fn open_socket(shared: &Arc<Shared>, request: &mut web::Request, host: &str) -> 
     let Ok(page) = shared.pages.clone().try_acquire_owned() else {
         return response(StatusCode::SERVICE_UNAVAILABLE, PLAIN, "Too many pages are open.\n");
     };
-    let shared = Arc::clone(shared);
+    let picture = Arc::clone(picture);
     web::when_switched(request, MAX_PAGE_MESSAGE, async move |socket| {
-        socket::serve(socket, &shared).await;
+        socket::serve(socket, &picture).await;
         drop(page);
     });
     switching

@@ -17,7 +17,7 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
 use super::messages::PageMessage;
 use super::update::{self, Shown};
-use super::{PageSetup, Shared, wire};
+use super::{PageSetup, Picture, wire};
 use crate::run::{Request, Snapshot};
 use crate::sink::web::{Beat, Pulse, WebSocket};
 
@@ -30,8 +30,8 @@ const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 const CALIBRATING_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Talks to a page until it leaves.
-pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
-    let mut page = Page::new(shared);
+pub(super) async fn serve(mut socket: WebSocket, picture: &Picture) {
+    let mut page = Page::new(picture);
     let reason = page.talk(&mut socket).await;
     if page.presses {
         page.ask(Request::Control(Control::Press(Vec::new())));
@@ -44,7 +44,7 @@ pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
 }
 
 struct Page<'a> {
-    shared: &'a Shared,
+    picture: &'a Picture,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     /// Whether the page has dealt with the last message.
     taken: bool,
@@ -64,13 +64,13 @@ enum Turn {
 }
 
 impl<'a> Page<'a> {
-    fn new(shared: &'a Shared) -> Self {
-        let mut snapshots = shared.snapshots.clone();
+    fn new(picture: &'a Picture) -> Self {
+        let mut snapshots = picture.shown.snapshots.clone();
         snapshots.mark_changed();
         let now = Instant::now();
-        let pulse = Pulse::new(shared.door.limits);
+        let pulse = Pulse::new(picture.door.limits);
         Self {
-            shared,
+            picture,
             snapshots,
             taken: false,
             update_due: now,
@@ -84,7 +84,7 @@ impl<'a> Page<'a> {
 
     /// Returns when the page has left, or with the reason to close.
     async fn talk(&mut self, socket: &mut WebSocket) -> Option<&'static str> {
-        self.pulse.send(socket, Message::text(self.shared.setup_message.clone())).await.ok()?;
+        self.pulse.send(socket, Message::text(self.picture.setup_message.clone())).await.ok()?;
         loop {
             tokio::select! {
                 heard = socket.next() => {
@@ -120,10 +120,10 @@ impl<'a> Page<'a> {
     fn hear(&mut self, text: &str) -> Result<(), &'static str> {
         let message = PageMessage::parse(text)?;
         self.taken |= message == PageMessage::Taken;
-        let Some(request) = message.request(&self.shared.setup)? else { return Ok(()) };
+        let Some(request) = message.request(&self.picture.shown.setup)? else { return Ok(()) };
         match &request {
             Request::Rezero => {
-                self.shared.rezeros.fetch_add(1, Ordering::Relaxed);
+                self.picture.rezeros.fetch_add(1, Ordering::Relaxed);
             }
             Request::Control(Control::Press(contacts)) => self.presses = !contacts.is_empty(),
             _ => {}
@@ -133,7 +133,7 @@ impl<'a> Page<'a> {
     }
 
     fn ask(&self, request: Request) {
-        if self.shared.requests.try_send(request).is_err() {
+        if self.picture.shown.requests.try_send(request).is_err() {
             tracing::warn!("a request of the page was dropped: the program does not take it");
         }
     }
@@ -142,7 +142,7 @@ impl<'a> Page<'a> {
         let snapshot = self.snapshots.borrow().clone();
         let interval = if snapshot.calibrating.is_some() { CALIBRATING_INTERVAL } else { STATUS_INTERVAL };
         self.status_due = Instant::now() + interval;
-        let rezeros = self.shared.rezeros.load(Ordering::Relaxed);
+        let rezeros = self.picture.rezeros.load(Ordering::Relaxed);
         wire::status(&snapshot, rezeros).ok().map(Message::text)
     }
 
@@ -153,7 +153,7 @@ impl<'a> Page<'a> {
         let answer = snapshot.answer.as_deref()?;
         let (course_v, points) = snapshot.course.points_since(self.course_points);
         self.course_points = points;
-        let PageSetup { detector, mesh, .. } = &self.shared.setup;
+        let PageSetup { detector, mesh, .. } = &self.picture.shown.setup;
         let shown = Shown {
             answer,
             contacts: &self.changes.take(&answer.solution.contacts).contacts,

@@ -26,6 +26,8 @@ struct SetupMessage<'a> {
     r#type: &'static str,
     /// How updates are to be read.
     layout: Layout,
+    /// The detector's name among several; none if it is alone.
+    name: &'a str,
     detector: &'a str,
     bounds_m: [[f64; 2]; 2],
     outline_m: Vec<&'a [[f64; 2]]>,
@@ -68,13 +70,14 @@ struct ElectrodeMessage {
 }
 
 /// The `setup` message.
-pub(super) fn setup(setup: &PageSetup) -> serde_json::Result<String> {
+pub(super) fn setup(setup: &PageSetup, name: &str) -> serde_json::Result<String> {
     let detector = &setup.detector;
     let loops = std::iter::once(&detector.outline.outer).chain(&detector.outline.holes);
     let (triangles, torn_triangles) = drawn_triangles(setup);
     serde_json::to_string(&SetupMessage {
         r#type: "setup",
         layout: layout(),
+        name,
         detector: &detector.name,
         bounds_m: detector.outline.bounds(),
         outline_m: loops.map(Vec::as_slice).collect(),
@@ -355,7 +358,7 @@ mod tests {
 
     #[test]
     fn the_setup_says_what_the_page_needs() {
-        let value = json(setup(&small_setup()));
+        let value = json(setup(&small_setup(), ""));
         assert_eq!(value["type"], "setup");
         assert_eq!(value["electrodes"].as_array().map(Vec::len), Some(16));
         assert_eq!(value["source"], "a \"quoted\" port");
@@ -376,7 +379,7 @@ mod tests {
         let detector = Detector::read(file.as_ref()).expect("an example");
         let model = tactomo_physics::forward::Auto::new(&detector, None).expect("a model").model;
         let mesh = model.image_mesh().clone();
-        let value = json(setup(&PageSetup { detector, mesh: mesh.clone(), ..small_setup() }));
+        let value = json(setup(&PageSetup { detector, mesh: mesh.clone(), ..small_setup() }, ""));
         let count = |name: &str| value[name].as_array().map_or(0, Vec::len);
         assert_eq!(count("places_m"), mesh.nodes_m.len());
         assert_eq!(count("triangles") + count("torn_triangles"), mesh.triangles.len());

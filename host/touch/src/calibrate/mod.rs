@@ -12,6 +12,7 @@ pub mod force;
 mod held_out;
 pub mod known;
 mod posterior;
+pub mod pressed;
 mod presses;
 mod rub;
 mod slopes;

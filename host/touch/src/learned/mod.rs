@@ -68,13 +68,22 @@ impl Learned {
     /// # Errors
     /// [`LearnedError`], which names the file and what in it is wrong.
     pub fn read(path: &Path) -> Result<Self, LearnedError> {
+        Self::read_with_bytes(path).map(|(learned, _)| learned)
+    }
+
+    /// Reads a file; with its bytes, as they are.
+    ///
+    /// # Errors
+    /// Those of [`Learned::read`].
+    pub fn read_with_bytes(path: &Path) -> Result<(Self, Vec<u8>), LearnedError> {
         let read = |source| LearnedError::Read { path: path.to_owned(), source };
         let mut bytes = Vec::new();
         File::open(path).map_err(read)?.take(LONGEST + 1).read_to_end(&mut bytes).map_err(read)?;
         if bytes.len() as u64 > LONGEST {
             return Err(LearnedError::Long { path: path.to_owned() });
         }
-        Self::parse(&bytes).map_err(|source| LearnedError::Content { path: path.to_owned(), source })
+        let learned = Self::parse(&bytes).map_err(|source| LearnedError::Content { path: path.to_owned(), source })?;
+        Ok((learned, bytes))
     }
 
     /// Reads the bytes of a file.

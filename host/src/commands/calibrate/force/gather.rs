@@ -1,13 +1,15 @@
 //! Presses of a file with their forces: what the solver `contacts` finds in it.
 
 use anyhow::{Context, bail, ensure};
-use tactomo::calibrate::force::{Moment, Plateau, pairs, plateaus};
+use tactomo::calibrate::force::{Moment, pairs};
+use tactomo::calibrate::pressed::{Pressed, Solved, pressed};
 use tactomo::detector::{Detector, ForceLaw};
-use tactomo::solve::{Method, Solution};
+use tactomo::solve::Method;
 
 use super::PressArgs;
 use super::known::{Known, KnownForce};
 use super::report::ReportedPress;
+use crate::commands::calibrate::solved;
 use crate::commands::reconstruct::reader::{Input, Reader};
 use tactomo_cli::choice::Model;
 use tactomo_cli::output::message;
@@ -53,56 +55,26 @@ pub fn gather(args: &PressArgs, known: &Known) -> anyhow::Result<Gathered> {
 }
 
 /// Solves all frames of a recording.
-fn moments(reader: &mut Reader) -> anyhow::Result<Vec<Moment>> {
-    let mut moments = Vec::new();
-    let mut last = Solution::default();
-    while let Some(frame) = reader.next_frame()? {
-        let time_s = frame.time_s.with_context(|| format!("{} has no time", reader.place()))?;
-        let solution = reader.solve(&frame).with_context(|| reader.place())?;
-        let first = solution.contacts.first();
-        moments.push(Moment {
-            time_s,
-            contacts: solution.contacts.len(),
-            conductance_s: first.and_then(|contact| contact.force_n).unwrap_or(0.0),
-            deviation_s: first.and_then(|contact| contact.force_deviation_n).unwrap_or(0.0),
-        });
-        last = solution;
+fn frames(reader: &mut Reader) -> anyhow::Result<Vec<Solved>> {
+    let frames = solved(reader)?;
+    if let Some(losses) = reader.losses() {
+        message!("warning: {losses}");
     }
-    warn(reader, &last);
     ensure!(
-        moments.iter().any(|moment| moment.contacts > 0),
+        frames.iter().any(|frame| !frame.contacts.is_empty()),
         "{}: no press in any of its {} frames: press firmer, each press for a second{}",
         reader.path().display(),
         reader.count(),
         reader.notice().map_or_else(String::new, |notice| format!(". {notice}"))
     );
-    Ok(moments)
-}
-
-/// What was wrong on the way, as `reconstruct` says it.
-fn warn(reader: &Reader, last: &Solution) {
-    if !last.flags.excluded.is_empty() {
-        let electrodes: Vec<_> = last.flags.excluded.iter().map(usize::to_string).collect();
-        message!("warning: electrodes {} were left out, since they contradict the others", electrodes.join(", "));
-    }
-    if let Some(losses) = reader.losses() {
-        message!("warning: {losses}");
-    }
+    Ok(frames)
 }
 
 fn of_plateaus(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec<ReportedPress>> {
-    let found = plateaus(&moments(reader)?);
+    let frames = frames(reader)?;
     let path = reader.path().display();
-    let times = || found.iter().map(|plateau| format!("{:.1}", plateau.time_s[0])).collect::<Vec<_>>().join(", ");
-    ensure!(
-        found.len() == forces.len(),
-        "{path}: {} presses are found, but {} forces are given: one for each press, in their order; presses begin at {} s, and one ends where \
-         nothing touches for a tenth of a second",
-        found.len(),
-        forces.len(),
-        times()
-    );
-    let press = |(index, (plateau, known)): (usize, (&Plateau, &KnownForce))| {
+    let found = pressed(&frames, forces.len(), "forces").with_context(|| path.to_string())?;
+    let press = |(index, (Pressed { plateau, .. }, known)): (usize, (&Pressed, &KnownForce))| {
         let [from_s, to_s] = plateau.time_s;
         ensure!(
             plateau.contacts == 1 && plateau.conductance_s > 0.0,
@@ -117,7 +89,7 @@ fn of_plateaus(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec
 }
 
 fn of_sensor(reader: &mut Reader, forces: &[[f64; 2]]) -> anyhow::Result<Vec<ReportedPress>> {
-    let moments = moments(reader)?;
+    let moments: Vec<Moment> = frames(reader)?.iter().map(Solved::moment).collect();
     let found = pairs(&moments, forces);
     let span = |times: &mut dyn Iterator<Item = f64>| {
         let [from_s, to_s] =

@@ -3,19 +3,17 @@
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use tactomo::calibrate::force::{Moment, plateaus};
 use tactomo::calibrate::known::KnownPress;
+use tactomo::calibrate::pressed::{Found, Pressed, pressed, single, standing};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::solve::{FoundContact, Method};
 
 use super::Args;
 use crate::commands::calibrate::known::{KnownPlace, NEAR_S, check_used};
+use crate::commands::calibrate::solved;
 use crate::commands::reconstruct::reader::{Input, Reader};
 use tactomo_cli::choice::Model;
 use tactomo_cli::output::message;
-
-/// Of a press in a recording, so much of its time in the middle is looked at: it comes before, and goes after.
-const MIDDLE: f64 = 0.5;
 
 /// Known places, and whether they are in the order of the presses.
 pub struct Known {
@@ -65,9 +63,6 @@ impl Skipped {
     }
 }
 
-/// What a solver found of a press: its only contact, or how many there are.
-type Found = Result<FoundContact, usize>;
-
 /// Reads a file and gives its presses their places.
 pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
     let mut reader = Reader::open(&Input {
@@ -96,7 +91,10 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
     let (mut presses, mut skipped) = (Vec::new(), Vec::new());
     for ((place, found), known) in found.into_iter().zip(&known.places) {
         match found {
-            Ok(contact) => presses.push((place, press(&contact, known, detector.force.as_ref()))),
+            Ok(contact) => {
+                let press = KnownPress::of(&contact, known.at_m, detector.force.as_ref(), known.force_n);
+                presses.push((place, press));
+            }
             Err(contacts) => skipped.push(Skipped { place, contacts }),
         }
     }
@@ -110,21 +108,6 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
     };
     let kept = detector.correction.as_ref().map(KnownPress::kept).unwrap_or_default();
     Ok(Gathered { detector, kept, presses, skipped, notice: notice.map(str::to_owned) })
-}
-
-/// A contact at a known place, and what the law of force says of its conductance.
-fn press(contact: &FoundContact, known: &KnownPlace, law: Option<&ForceLaw>) -> KnownPress {
-    let log_conductance = || {
-        let (law, force_n) = law.zip(known.force_n)?;
-        let (found_s, deviation_s) = contact.force_n.zip(contact.force_deviation_n)?;
-        (found_s > 0.0).then(|| [(found_s / law.conductance_s(force_n)).ln(), deviation_s / found_s])
-    };
-    KnownPress {
-        found_m: [contact.x_m, contact.y_m],
-        standard_errors_m: contact.uncertainty.map_or([0.0; 2], |claimed| [claimed.x_m, claimed.y_m]),
-        known_m: known.at_m,
-        log_conductance: log_conductance(),
-    }
 }
 
 /// Presses of a table, in the order of the places.
@@ -154,13 +137,6 @@ fn of_rows(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, Fo
     Ok(known.places.iter().zip(found).filter_map(named).collect())
 }
 
-fn single(contacts: &[FoundContact]) -> Found {
-    match contacts {
-        [contact] => Ok(*contact),
-        other => Err(other.len()),
-    }
-}
-
 /// Presses of a recording at known times.
 fn of_times(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, Found)>> {
     let mut frames: Vec<Vec<Vec<FoundContact>>> = vec![Vec::new(); known.places.len()];
@@ -176,54 +152,19 @@ fn of_times(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, F
     let unused = known.places.iter().zip(&frames).find(|(_, frames)| frames.is_empty()).map(|(place, _)| place);
     check_used(reader.path(), unused, true)?;
     let named = |(place, frames): (&KnownPlace, &Vec<Vec<FoundContact>>)| {
-        (format!("{:.1} to {:.1} s", place.at - NEAR_S, place.at + NEAR_S), standing(frames))
+        (format!("{:.1} to {:.1} s", place.at - NEAR_S, place.at + NEAR_S), standing(frames.iter().map(Vec::as_slice)))
     };
     Ok(known.places.iter().zip(&frames).map(named).collect())
 }
 
-/// The contact of frames in which something stands: the last one, which the solver knows best, if most frames have it alone.
-fn standing(frames: &[Vec<FoundContact>]) -> Found {
-    let alone: Vec<&FoundContact> =
-        frames.iter().filter_map(|contacts| contacts.first().filter(|_| contacts.len() == 1)).collect();
-    match alone.last() {
-        Some(contact) if 2 * alone.len() >= frames.len() => Ok(**contact),
-        _ => Err(frames.iter().map(Vec::len).filter(|contacts| *contacts != 1).max().unwrap_or(0)),
-    }
-}
-
 /// Presses of a recording in their order.
 fn of_plateaus(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, Found)>> {
-    let (mut moments, mut frames) = (Vec::new(), Vec::new());
-    while let Some(frame) = reader.next_frame()? {
-        let time_s = frame.time_s.with_context(|| format!("{} has no time", reader.place()))?;
-        let contacts = reader.solve(&frame).with_context(|| reader.place())?.contacts;
-        let first = contacts.first();
-        moments.push(Moment {
-            time_s,
-            contacts: contacts.len(),
-            conductance_s: first.and_then(|contact| contact.force_n).unwrap_or(0.0),
-            deviation_s: first.and_then(|contact| contact.force_deviation_n).unwrap_or(0.0),
-        });
-        frames.push(contacts);
-    }
-    let found = plateaus(&moments);
-    let times = || found.iter().map(|plateau| format!("{:.1}", plateau.time_s[0])).collect::<Vec<_>>().join(", ");
-    ensure!(
-        found.len() == known.places.len(),
-        "{}: {} presses are found, but {} places are given: one for each press, in their order; presses begin at {} s, and one ends where \
-         nothing touches for a tenth of a second",
-        reader.path().display(),
-        found.len(),
-        known.places.len(),
-        times()
-    );
-    let press = |plateau: &tactomo::calibrate::force::Plateau| {
-        let [from_s, to_s] = plateau.time_s;
-        let margin_s = 0.5 * (1.0 - MIDDLE) * (to_s - from_s);
-        let middle = from_s + margin_s..=to_s - margin_s;
-        let within = moments.iter().zip(&frames).filter(|(moment, _)| middle.contains(&moment.time_s));
-        let within: Vec<_> = within.map(|(_, contacts)| contacts.clone()).collect();
-        (format!("{from_s:.1} to {to_s:.1} s"), standing(&within))
+    let frames = solved(reader)?;
+    let presses = pressed(&frames, known.places.len(), "places");
+    let presses = presses.with_context(|| reader.path().display().to_string())?;
+    let named = |press: Pressed| {
+        let [from_s, to_s] = press.plateau.time_s;
+        (format!("{from_s:.1} to {to_s:.1} s"), press.found)
     };
-    Ok(found.iter().map(press).collect())
+    Ok(presses.into_iter().map(named).collect())
 }

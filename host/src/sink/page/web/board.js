@@ -49,14 +49,17 @@ export class Board {
   }
 
   #showSource() {
-    const { source, simulated, detector, electrodes } = this.setup;
+    const { name, source, simulated, detector, electrodes } = this.setup;
+    const among = document.getElementById("among");
+    among.hidden = !name;
+    among.querySelector("strong").textContent = name;
     document.getElementById("detector").textContent = `${detector}, ${electrodes.length} electrodes`;
     const badge = document.getElementById("source");
     badge.hidden = false;
     badge.textContent = simulated ? "Simulated" : source;
     badge.title = source;
     badge.classList.toggle("simulated", simulated);
-    document.title = `Tactomo live: ${simulated ? "simulated board" : source}`;
+    document.title = `Tactomo live: ${name || (simulated ? "simulated board" : source)}`;
   }
 
   /** Shows a status message. */

@@ -7,6 +7,29 @@ import { Layout, sizeCanvas } from "./layout.js";
 import { drawLabels, drawMark, drawTrail } from "./marks.js";
 import { TARGET_RADIUS, drawTarget } from "./target.js";
 
+/** The heat of a field on a canvas, one pixel of the one to one of the other: the browser makes it as large as the picture, smoothly, and with the graphics processor where there is one. */
+export class HeatCanvas {
+  constructor(canvas, field) {
+    [canvas.width, canvas.height] = [field.width, field.height];
+    this.field = field;
+    this.context = canvas.getContext("2d");
+    this.image = new ImageData(field.width, field.height);
+    this.pixels = new Uint32Array(this.image.data.buffer);
+  }
+
+  /** Draws it up to `max` (S/m2) in the colours of a theme. */
+  draw(max, theme) {
+    const colours = colourMaps(theme).image;
+    const [last, factor] = [colours.length - 1, 1 / max];
+    for (let i = 0; i < this.pixels.length; i += 1) {
+      if (!this.field.isOn(i)) continue; // stays transparent
+      const share = this.field.values[i] * factor;
+      this.pixels[i] = colours[share <= 0 ? 0 : share >= 1 ? last : Math.round(last * Math.sqrt(share))];
+    }
+    this.context.putImageData(this.image, 0, 0);
+  }
+}
+
 /** Draws the heat of `view.field` on the scale `view.scale` in the colours of `view.theme`. */
 export class FlatView {
   constructor(view) {
@@ -14,11 +37,7 @@ export class FlatView {
     this.canvas = document.getElementById("image");
     this.frame = new FrameCanvas();
     this.marks = document.getElementById("marks");
-    // A pixel of the field is one of the canvas: the browser makes it as large as the picture, smoothly, and with the graphics processor where there is one.
-    [this.canvas.width, this.canvas.height] = [view.field.width, view.field.height];
-    this.heat = this.canvas.getContext("2d");
-    this.image = new ImageData(view.field.width, view.field.height);
-    this.pixels = new Uint32Array(this.image.data.buffer);
+    this.heat = new HeatCanvas(this.canvas, view.field);
   }
 
   /** Fits into a box of pixels. */
@@ -35,8 +54,8 @@ export class FlatView {
 
   /** Draws all of it. */
   draw(now) {
-    this.#drawHeat();
     const { view, over, layout } = this;
+    this.heat.draw(view.scale.max, view.theme);
     const { theme, scale, marked, excluded } = view;
     this.frame.draw([theme, scale.max, marked, excluded], (context) => drawFrame(context, view.setup, layout, view));
     over.clearRect(0, 0, layout.boxWidth, layout.boxHeight);
@@ -58,18 +77,6 @@ export class FlatView {
     drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight }, target ? [target] : []);
     if (target) drawTarget(over, view.target, [target.x, target.y], view.colours);
     this.#drawFingers();
-  }
-
-  #drawHeat() {
-    const { field, scale, theme } = this.view;
-    const colours = colourMaps(theme).image;
-    const [last, factor] = [colours.length - 1, 1 / scale.max];
-    for (let i = 0; i < this.pixels.length; i += 1) {
-      if (!field.isOn(i)) continue; // stays transparent
-      const share = field.values[i] * factor;
-      this.pixels[i] = colours[share <= 0 ? 0 : share >= 1 ? last : Math.round(last * Math.sqrt(share))];
-    }
-    this.heat.putImageData(this.image, 0, 0);
   }
 
   // Where the person presses, and the cursor of the keyboard.

@@ -13,6 +13,14 @@ import { Trails } from "./trails.js";
 const FLOOR_SHARE = 0.004;
 const FIRM_SHARE = 0.3;
 
+/** The scale of a detector's colours, before anything touches. */
+export function scaleOf(setup) {
+  const [[left, bottom], [right, top]] = setup.bounds_m;
+  const areaM2 = ((right - left) * (top - bottom)) / setup.electrodes.length;
+  const firm = densityOf({ apparentS: null, conductanceS: FIRM_SHARE * setup.sheet_conductance_s }, setup.usual_radius_m);
+  return new SteadyScale((FLOOR_SHARE * setup.sheet_conductance_s) / areaM2, firm);
+}
+
 /** Draws the touch; tells of it through `document.documentElement.dataset`. */
 export class Picture {
   constructor(setup, theme, told) {
@@ -23,10 +31,7 @@ export class Picture {
     this.box = document.getElementById("plot");
     this.field = new HeatField(setup);
     this.trails = new Trails();
-    const [[left, bottom], [right, top]] = setup.bounds_m;
-    const areaM2 = ((right - left) * (top - bottom)) / setup.electrodes.length;
-    const firm = densityOf({ apparentS: null, conductanceS: FIRM_SHARE * setup.sheet_conductance_s }, setup.usual_radius_m);
-    this.scale = new SteadyScale((FLOOR_SHARE * setup.sheet_conductance_s) / areaM2, firm);
+    this.scale = scaleOf(setup);
     this.excluded = [];
     this.empty = null;
     this.marked = null;

@@ -135,12 +135,13 @@ export function decodeUpdate(buffer, layout) {
 const RETRY_MS = [250, 500, 1000, 2000];
 
 /**
- * The socket to the program: connects, and connects again when it is lost. `on` has `setup`, `status`, `update`, each given a
- * message, and `lost`. After each message the program waits for `taken()`.
+ * The socket to the program, beside the page or in the folder `under` it: connects, and connects again when it is lost. `on` has `setup`, `status`,
+ * `update`, each given a message, and `lost`. After each message the program waits for `taken()`.
  */
 export class Connection {
-  constructor(on) {
+  constructor(on, under = "") {
     this.on = on;
+    this.under = under;
     this.attempt = 0;
     this.#connect();
   }
@@ -157,7 +158,7 @@ export class Connection {
 
   #connect() {
     // Beside the page, behind the token if there is one.
-    const address = new URL("socket", location.href);
+    const address = new URL(`${this.under}socket`, location.href);
     address.protocol = "ws:";
     this.socket = new WebSocket(address);
     this.socket.binaryType = "arraybuffer";

@@ -9,8 +9,10 @@ mod smooth;
 #[cfg(test)]
 mod tests;
 
-use tactomo_physics::detector::{ConductanceErrors, Correction, Detector, PlaceErrors};
+use tactomo_physics::detector::{ConductanceErrors, Correction, Detector, ForceLaw, PlaceErrors};
 use tactomo_physics::geometry::area;
+
+use crate::solve::FoundContact;
 
 pub use self::order::WouldFit;
 use self::smooth::{Channel, Errors, Verdict, judge};
@@ -165,6 +167,21 @@ pub fn correction(
 }
 
 impl KnownPress {
+    /// That of a contact which was found on a detector with [`ForceLaw::siemens`]; of a known force, what the `law` says of its conductance.
+    pub fn of(contact: &FoundContact, known_m: [f64; 2], law: Option<&ForceLaw>, force_n: Option<f64>) -> Self {
+        let log_conductance = || {
+            let (law, force_n) = law.zip(force_n)?;
+            let (found_s, deviation_s) = contact.force_n.zip(contact.force_deviation_n)?;
+            (found_s > 0.0).then(|| [(found_s / law.conductance_s(force_n)).ln(), deviation_s / found_s])
+        };
+        Self {
+            found_m: [contact.x_m, contact.y_m],
+            standard_errors_m: contact.uncertainty.map_or([0.0; 2], |claimed| [claimed.x_m, claimed.y_m]),
+            known_m,
+            log_conductance: log_conductance(),
+        }
+    }
+
     /// The presses that a correction was made from, as far as it keeps them: all, if it corrects places.
     pub fn kept(correction: &Correction) -> Vec<Self> {
         let conductance_at = |found_m: [f64; 2]| {

@@ -7,6 +7,7 @@
 
 #[cfg(test)]
 mod coverage_tests;
+mod discrepancy;
 mod discs;
 mod doubt;
 mod evidence;
@@ -17,7 +18,6 @@ mod marginals;
 #[cfg(test)]
 mod motion_tests;
 mod multiple_models;
-mod off;
 mod on_detector;
 #[cfg(test)]
 mod places_tests;

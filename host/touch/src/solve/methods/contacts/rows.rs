@@ -3,9 +3,9 @@
 //! What is followed was searched in all readings. From then on each frame of a few rows moves it by what is new in them ([`MultipleModels`]). What
 //! all readings are off by together, as those of a detector that is not known exactly are, was found with the contacts, and is taken off.
 
+use super::discrepancy::Discrepancy;
 use super::discs::{DiscFit, DiscFitter, Effort};
 use super::multiple_models::{MultipleModels, Rows};
-use super::off::Off;
 use super::systematic_error::SystematicError;
 use super::{ContactFinder, ContactHypothesis};
 use crate::solve::fit::dot::dot;
@@ -29,7 +29,7 @@ pub(super) struct RowState {
     filters: MultipleModels,
     /// What model and board are off by goes into the parameters however many rows come.
     systematic_error: SystematicError,
-    off: Off,
+    discrepancy: Discrepancy,
     /// Frames in a row that do not fit.
     unfit: u32,
     /// Logarithm of the odds for there being nothing, of late.
@@ -52,7 +52,7 @@ impl RowState {
         Self {
             filters: MultipleModels::new(found.fit.normal.clone()),
             systematic_error: SystematicError::new(&found.fit, target),
-            off: finder.off(&found.fit, target),
+            discrepancy: finder.discrepancy(&found.fit, target),
             unfit: 0,
             gone: 0.0,
         }
@@ -69,25 +69,28 @@ impl RowState {
     }
 
     /// What all readings are off by.
-    pub fn off(&self) -> &Off {
-        &self.off
+    pub fn discrepancy(&self) -> &Discrepancy {
+        &self.discrepancy
     }
 
     /// Whether contacts that predict such readings (V) have gone so far that a whole frame has to tell anew what readings are off by.
     pub fn is_stale(&self, volts: &[f64]) -> bool {
-        self.off.is_stale(volts)
+        self.discrepancy.is_stale(volts)
     }
 }
 
 impl ContactFinder {
     /// What rows are fitted as, less what all readings are off by; where that is not known yet of a detector, each by itself may be.
-    pub(super) fn target_of_rows(&self, rows: &Readings, off: Option<&Off>) -> Target {
-        let Some(off) = off.filter(|off| !off.is_nothing()) else {
+    pub(super) fn target_of_rows(&self, rows: &Readings, discrepancy: Option<&Discrepancy>) -> Target {
+        let Some(discrepancy) = discrepancy.filter(|discrepancy| !discrepancy.is_nothing()) else {
             return Target::provisional(rows, 1, &self.errors);
         };
         let mut less = rows.clone();
-        less.volts_mut().iter_mut().zip(off.left_v()).for_each(|(volts, off_v)| *volts -= off_v);
-        Target::of_mean(&less, 1, &self.errors, None).with_model_error(off.new_v())
+        less.volts_mut()
+            .iter_mut()
+            .zip(discrepancy.left_v())
+            .for_each(|(volts, discrepancy_v)| *volts -= discrepancy_v);
+        Target::of_mean(&less, 1, &self.errors, None).with_model_error(discrepancy.new_v())
     }
 
     /// Brings contacts to rows that come `elapsed_s` (s) after those before.
@@ -105,11 +108,11 @@ impl ContactFinder {
             return Step::Gone;
         }
         let search = state.unfit >= policy::unfit_frames();
-        state.off.follow(&fit.volts);
-        if state.off.is_outdated() {
-            state.off = self.off_elsewhere(&state.off, &fit).unwrap_or(state.off);
+        state.discrepancy.follow(&fit.volts);
+        if state.discrepancy.is_outdated() {
+            state.discrepancy = self.discrepancy_at(&state.discrepancy, &fit).unwrap_or(state.discrepancy);
         }
-        state.systematic_error.add(&fit, target, &self.errors, &state.off);
+        state.systematic_error.add(&fit, target, &self.errors, &state.discrepancy);
         let known = state.filters.information();
         let stays = state.systematic_error.covariance(&fit);
         let covariance = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());

@@ -6,12 +6,12 @@
 //! has the patterns of pads and converters, and of each reading by itself the model's error and rounding.
 //!
 //! Of a detector that is not known exactly, what readings are off by was found with the contacts in all readings, and is taken off rows: `E` is of
-//! what is [not known](super::off) of that.
+//! what is [not known](super::discrepancy) of that.
 
 use nalgebra::{Cholesky, DMatrix};
 
+use super::discrepancy::Discrepancy;
 use super::discs::{DiscFit, PARAMETERS};
-use super::off::Off;
 use crate::solve::fit::target::{Errors, Target};
 use tactomo_physics::readings::Readings;
 
@@ -45,8 +45,8 @@ impl SystematicError {
         }
     }
 
-    /// Takes the rows of a target into account, less what all readings are `off` by.
-    pub fn add(&mut self, fit: &DiscFit, target: &Target, errors: &Errors, off: &Off) {
+    /// Takes the rows of a target into account, less what all readings are off by.
+    pub fn add(&mut self, fit: &DiscFit, target: &Target, errors: &Errors, discrepancy: &Discrepancy) {
         let is_looked_at = self.frames.is_multiple_of(LOOKED_AT);
         self.frames += 1;
         if !is_looked_at {
@@ -58,15 +58,21 @@ impl SystematicError {
         let frames = f64::from(LOOKED_AT);
         self.information = KEPT_SHARE * &self.information + frames * &pulls * slopes;
         self.pulls = KEPT_SHARE * &self.pulls + frames * pulls;
-        if let Some(covariance) = self.reckoned(fit, target, errors, off) {
+        if let Some(covariance) = self.reckoned(fit, target, errors, discrepancy) {
             self.covariance = covariance;
         }
     }
 
-    fn reckoned(&self, fit: &DiscFit, target: &Target, errors: &Errors, off: &Off) -> Option<DMatrix<f64>> {
+    fn reckoned(
+        &self,
+        fit: &DiscFit,
+        target: &Target,
+        errors: &Errors,
+        discrepancy: &Discrepancy,
+    ) -> Option<DMatrix<f64>> {
         let gains = Cholesky::new(self.information.clone())?.solve(&self.pulls);
-        if !off.is_nothing() {
-            let by_patterns = &gains * &off.patterns_v;
+        if !discrepancy.is_nothing() {
+            let by_patterns = &gains * &discrepancy.patterns_v;
             return Some(&by_patterns * by_patterns.transpose());
         }
         let n = fit.volts.len().isqrt();

@@ -91,8 +91,8 @@ impl ContactTracker {
         if let Some((last, whole)) = self.last.as_ref().zip(self.whole.take()) {
             self.rows = Some(Box::new(RowState::new(&self.finder, last, &whole)));
         }
-        let off = self.rows.as_ref().map(|state| state.off());
-        let target = self.finder.target_of_rows(rows, off);
+        let discrepancy = self.rows.as_ref().map(|state| state.discrepancy());
+        let target = self.finder.target_of_rows(rows, discrepancy);
         let Some(last) = self.last.take() else {
             self.rows = None;
             // A rough contact is better than none for the time of a search.

@@ -1,4 +1,4 @@
-//! What the readings of contacts that move are off by, on a detector that is not known exactly.
+//! What the readings of contacts that move differ from the model by, on a detector that is not known exactly.
 //!
 //! Whole frames tell what detector and board are likely to differ by. With patterns `P` of one standard deviation each, residuals `r` and noise
 //! of the deviation `d`, the steps along the patterns have
@@ -27,7 +27,7 @@ const RENEWED: f64 = 0.5;
 
 /// What all readings are off by, of a detector that is not known exactly; nothing of one that is.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Off {
+pub(super) struct Discrepancy {
     /// As far as it is known (V).
     pub volts: Vec<f64>,
     /// What it may be besides, in independent patterns of one standard deviation (V), a column each.
@@ -63,7 +63,7 @@ impl Steps {
     }
 }
 
-impl Off {
+impl Discrepancy {
     /// Takes note of the readings that contacts predict now (V).
     pub fn follow(&mut self, volts: &[f64]) {
         self.changed = (change(&self.made_for, volts) / policy::stale_share()).min(1.0);
@@ -104,15 +104,15 @@ fn change(before: &[f64], after: &[f64]) -> f64 {
 
 impl ContactFinder {
     /// What readings are off by as whole frames tell it; nothing of a detector that is known exactly.
-    pub(super) fn off(&self, fit: &DiscFit, target: &Target) -> Off {
-        self.told_off(fit, target).unwrap_or_default()
+    pub(super) fn discrepancy(&self, fit: &DiscFit, target: &Target) -> Discrepancy {
+        self.inferred_discrepancy(fit, target).unwrap_or_default()
     }
 
-    fn told_off(&self, fit: &DiscFit, target: &Target) -> Option<Off> {
+    fn inferred_discrepancy(&self, fit: &DiscFit, target: &Target) -> Option<Discrepancy> {
         let about = target.error()?.about.clone();
-        let here = self.patterns_here(fit, &about)?;
-        let plain = target.with(ApproximationError::of_mean(here.mean_v.clone()));
-        let mut patterns_v = here.patterns_v.clone();
+        let patterns = self.patterns_at(fit, &about)?;
+        let plain = target.with(ApproximationError::of_mean(patterns.mean_v.clone()));
+        let mut patterns_v = patterns.patterns_v.clone();
         plain.mask(&mut patterns_v);
         let variance_v2 = plain.deviation_v().powi(2);
         let mut information = patterns_v.tr_mul(&patterns_v) / variance_v2;
@@ -125,17 +125,17 @@ impl ContactFinder {
         let contacts = self.disc_fitter().covariance(fit, &plain)?;
         information -= along.tr_mul(&(contacts * &along));
         let steps = Arc::new(Steps { mean, factor: Cholesky::new(information)?, about });
-        Some(here.off(steps, fit.volts.clone(), fit.volts.clone()))
+        Some(patterns.after(steps, fit.volts.clone(), fit.volts.clone()))
     }
 
     /// The same detector with contacts that have gone on; `None` if they make no sense.
-    pub(super) fn off_elsewhere(&self, off: &Off, fit: &DiscFit) -> Option<Off> {
-        let steps = off.steps.clone()?;
-        let here = self.patterns_here(fit, &steps.about)?;
-        Some(here.off(steps, fit.volts.clone(), off.found_with.clone()))
+    pub(super) fn discrepancy_at(&self, before: &Discrepancy, fit: &DiscFit) -> Option<Discrepancy> {
+        let steps = before.steps.clone()?;
+        let patterns = self.patterns_at(fit, &steps.about)?;
+        Some(patterns.after(steps, fit.volts.clone(), before.found_with.clone()))
     }
 
-    fn patterns_here(&self, fit: &DiscFit, about: &About) -> Option<Patterns> {
+    fn patterns_at(&self, fit: &DiscFit, about: &About) -> Option<Patterns> {
         let (patterns_v, described) = self.patterns_v(&fit.contacts, about)?;
         let mean_v = match &about.near {
             Some(near) => {
@@ -157,10 +157,10 @@ struct Patterns {
 }
 
 impl Patterns {
-    fn off(self, steps: Arc<Steps>, made_for: Vec<f64>, found_with: Vec<f64>) -> Off {
+    fn after(self, steps: Arc<Steps>, made_for: Vec<f64>, found_with: Vec<f64>) -> Discrepancy {
         let by_steps = &self.patterns_v * &steps.mean;
         let volts = self.mean_v.iter().zip(&by_steps).map(|(mean, steps)| mean + steps).collect();
-        Off {
+        Discrepancy {
             volts,
             patterns_v: steps.unknown(&self.patterns_v),
             steps: Some(steps),

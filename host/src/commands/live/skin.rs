@@ -1,0 +1,238 @@
+//! A skin: several detectors, each with its board, shown together.
+//!
+//! A skin's file has a table `[[patch]]` for each detector: its `name`, and whatever options of `tactomo live` belong to one board, by their
+//! names. So what a patch may be asked for is what the command may be, and is checked by the same rules.
+
+use std::path::{Path, PathBuf};
+
+use clap::Parser;
+use tactomo::causes::with_causes;
+
+use super::Args;
+
+/// Options of the program as a whole, which a patch has none of.
+const OF_ALL: [&str; 7] = ["skin", "http-port", "listen", "allow-origin", "no-open", "json", "seconds"];
+/// Arguments of one board, which patches have in place of the command line; `simulated` are those of scenes.
+pub const OF_ONE: [&str; 25] = [
+    "port",
+    "simulate",
+    "baud",
+    "settle_us",
+    "average",
+    "max_fps",
+    "select_us",
+    "discard",
+    "replay",
+    "detector",
+    "material",
+    "solver",
+    "learned",
+    "jacobian",
+    "no_learning",
+    "pointer",
+    "scan",
+    "record",
+    "foxglove",
+    "mcap",
+    "elf",
+    "board",
+    "time_factor",
+    "speed",
+    "simulated",
+];
+/// Options whose values are files that are read, beside the skin's unless their paths are absolute.
+const FILES: [&str; 5] = ["detector", "learned", "jacobian", "replay", "elf"];
+
+/// Why a skin cannot be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum SkinError {
+    /// The file cannot be read.
+    #[error("cannot read the skin {path}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is no skin.
+    #[error("{path} is no skin: {what}")]
+    Skin {
+        /// The file.
+        path: PathBuf,
+        /// Why, and what to do.
+        what: String,
+    },
+    /// A patch of it is none.
+    #[error("patch {patch} of {path}: {what}")]
+    Patch {
+        /// The file.
+        path: PathBuf,
+        /// The patch's name.
+        patch: String,
+        /// Why, and what to do.
+        what: String,
+    },
+}
+
+/// A skin's file.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    patch: Vec<Patch>,
+}
+
+/// A patch in it.
+#[derive(serde::Deserialize)]
+struct Patch {
+    name: String,
+    #[serde(flatten)]
+    options: toml::Table,
+}
+
+/// What is read as a command line of its own.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct Options {
+    #[command(flatten)]
+    args: Args,
+}
+
+/// The detectors of a skin, each by its name, as if each were shown alone.
+///
+/// # Errors
+/// [`SkinError`] if the file is no skin, or a patch asks for what cannot be.
+pub fn read(path: &Path) -> Result<Vec<(String, Args)>, SkinError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SkinError::Read { path: path.to_owned(), source })?;
+    of_text(&text, path)
+}
+
+fn of_text(text: &str, path: &Path) -> Result<Vec<(String, Args)>, SkinError> {
+    let no_skin = |what: String| SkinError::Skin { path: path.to_owned(), what };
+    let File { patch: patches } = toml::from_str(text).map_err(|error| no_skin(with_causes(&error)))?;
+    if patches.is_empty() {
+        return Err(no_skin("it has no [[patch]]".to_owned()));
+    }
+    let mut read: Vec<(String, Args)> = Vec::with_capacity(patches.len());
+    for Patch { name, options } in patches {
+        let wrong = |what| SkinError::Patch { path: path.to_owned(), patch: name.clone(), what };
+        let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if name.is_empty() || !name.chars().all(is_name) {
+            return Err(wrong("a name is of letters, digits, - and _, as it is part of an address".to_owned()));
+        }
+        if read.iter().any(|(other, _)| *other == name) {
+            return Err(wrong("another patch has this name: give each its own".to_owned()));
+        }
+        let words = words(&options, path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;
+        let parsed = Options::try_parse_from(words).map_err(|error| wrong(said(&error)))?;
+        if parsed.args.streams.use_stdout() {
+            return Err(wrong("stdout is of all: give --stream - on the command line".to_owned()));
+        }
+        read.push((name, parsed.args));
+    }
+    Ok(read)
+}
+
+/// Options as words of a command line.
+fn words(options: &toml::Table, folder: &Path) -> Result<Vec<String>, String> {
+    let mut words = Vec::new();
+    for (key, value) in options {
+        let option = key.replace('_', "-");
+        if OF_ALL.contains(&option.as_str()) {
+            return Err(format!("{key} is of the program as a whole: give --{option} on the command line"));
+        }
+        let word = |value: &toml::Value| match value {
+            toml::Value::String(text) if is_file(&option, text) => Ok(folder.join(text).display().to_string()),
+            toml::Value::String(text) => Ok(text.clone()),
+            toml::Value::Integer(number) => Ok(number.to_string()),
+            toml::Value::Float(number) => Ok(number.to_string()),
+            _ => Err(format!("{key} has to be a text, a number, true, or a list of texts")),
+        };
+        match value {
+            toml::Value::Boolean(true) => words.push(format!("--{option}")),
+            toml::Value::Boolean(false) => {}
+            toml::Value::Array(values) => {
+                for value in values {
+                    words.push(format!("--{option}={}", word(value)?));
+                }
+            }
+            value => words.push(format!("--{option}={}", word(value)?)),
+        }
+    }
+    Ok(words)
+}
+
+/// Whether a text is a file: detectors and what is learned may be presets too, which have no dot.
+fn is_file(option: &str, text: &str) -> bool {
+    FILES.contains(&option) && (option != "detector" || text.contains('.'))
+}
+
+/// What a command line's parser says, in a line.
+fn said(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let lines =
+        text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage") && !line.starts_with("For more"));
+    let all: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
+    all.join("; ").trim_start_matches("error: ").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<(String, Args)>, String> {
+        of_text(text, Path::new("skins/hand.toml")).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_patch_has_the_options_of_the_command_by_their_names() {
+        let text = "[[patch]]\nname = \"thumb\"\nsimulate = true\nboard = \"ideal\"\nforce = 0.5\nfault = [\"open:3\"]\n\
+                    [[patch]]\nname = \"palm\"\nport = \"/dev/ttyUSB1\"\nmax_fps = 100\ndetector = \"palm.toml\"\nno_learning = false\n";
+        let patches = read(text).unwrap();
+        let [(thumb, of_thumb), (palm, of_palm)] = &patches[..] else { panic!("two patches") };
+        assert_eq!([thumb, palm], ["thumb", "palm"]);
+        assert!(of_thumb.board.simulate && of_thumb.board.scene.fault.len() == 1 && !of_palm.picture.no_learning);
+        assert_eq!(of_palm.board.port.as_deref(), Some("/dev/ttyUSB1"));
+        let chosen = of_palm.picture.detector.detector.as_ref().map(|chosen| format!("{chosen:?}"));
+        assert!(chosen.is_some_and(|chosen| chosen.contains("skins/palm.toml")));
+    }
+
+    #[test]
+    fn options_of_one_board_are_refused_beside_a_skin_and_none_is_ignored() {
+        let command = <Options as clap::CommandFactory>::command();
+        for option in command.get_arguments().filter_map(clap::Arg::get_long) {
+            let of_streams = option.starts_with("stream");
+            if OF_ALL.contains(&option) || of_streams {
+                continue;
+            }
+            let values = ["", "=1", "=a", "=4", "=rest", "=esp32", "=A", "=auto"];
+            let is_taken = |value: &&str| {
+                let words = ["--skin=hand.toml".to_owned(), format!("--{option}{value}")];
+                Options::try_parse_from(words).is_ok()
+            };
+            assert!(!values.iter().any(is_taken), "--{option} beside --skin is ignored");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_patch() {
+        let of = |options: &str| read(&format!("[[patch]]\nname = \"thumb\"\n{options}\n")).err().unwrap();
+        for (options, what) in [
+            (
+                "seconds = 3",
+                "patch thumb of skins/hand.toml: seconds is of the program as a whole: give --seconds on the command line",
+            ),
+            ("sceen = \"ring\"", "unexpected argument '--sceen'"),
+            ("simulate = true\nforce = \"much\"", "invalid value 'much' for '--force"),
+            ("port = 3.5\nsimulate = true", "cannot be used with"),
+            ("[[patch]]\nname = \"thumb\"", "another patch has this name"),
+            ("[[patch]]\nname = \"a/b\"", "letters, digits"),
+            ("fault = [[1]]", "fault has to be a text"),
+            ("simulate = true\nstream = \"-\"", "give --stream - on the command line"),
+        ] {
+            assert!(of(options).contains(what), "{options}: {}", of(options));
+        }
+        for text in ["", "patch = []", "name = 3", "[[patch]]\nsimulate = true", "\u{0}"] {
+            assert!(read(text).is_err_and(|error| error.starts_with("skins/hand.toml is no skin: ")), "{text}");
+        }
+    }
+}
