@@ -24,6 +24,7 @@ use tactomo_physics::readings::{Readings, Says};
 pub struct Compiled {
     bytes: Arc<[u8]>,
     electrodes: usize,
+    drive_v: f64,
     core: Core,
 }
 
@@ -40,7 +41,14 @@ impl Compiled {
             error => refused(with_causes(&error)),
         })?;
         Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
-        Ok(Self { bytes: bytes.into(), electrodes: detector.electrodes.len(), core: Core::new() })
+        let (electrodes, drive_v) = (detector.electrodes.len(), detector.drive_v);
+        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Core::new() })
+    }
+
+    /// A reading as a board can give it (V): none is far beyond its drive. Numbers from elsewhere may be none in `f32`.
+    fn held(&self, volts: f64) -> f32 {
+        let most_v = 2.0 * self.drive_v;
+        (if volts.is_finite() { volts.clamp(-most_v, most_v) } else { volts }) as f32
     }
 }
 
@@ -51,7 +59,7 @@ impl Solver for Compiled {
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         check_count(readings, self.electrodes)?;
-        let volts: Vec<_> = readings.volts().iter().map(|volts| *volts as f32).collect();
+        let volts: Vec<_> = readings.volts().iter().map(|volts| self.held(*volts)).collect();
         let says: Vec<_> = readings.all_say().iter().map(|says| core_says(*says)).collect();
         let wrong = SolveError::Electrodes { found: readings.electrodes(), expected: self.electrodes };
         // It was read, and checked, when it was compiled.
