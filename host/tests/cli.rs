@@ -227,6 +227,25 @@ fn what_was_built_is_told_and_can_be_simulated_again() {
 }
 
 #[test]
+fn a_flat_detector_is_compiled_into_a_table() {
+    let folder = Folder::new("compile");
+    let file = folder.path("square.table");
+    let compile = ["detector", "compile", "square-60", "--json", "--out", &file];
+    let told = TACTOMO.json(&compile);
+    let table = std::fs::read(&file).unwrap();
+    assert_eq!((told["bytes"].as_u64(), told["electrodes"].as_u64()), (Some(table.len() as u64), Some(16)));
+    assert!(table.starts_with(b"TCtb"), "{:?}", &table[..4]);
+    assert!(TACTOMO.refused(&compile).contains("--overwrite"));
+    assert_eq!(TACTOMO.json(&[&compile[..], &["--overwrite"]].concat()), told);
+    assert_eq!(std::fs::read(&file).unwrap(), table);
+    let curved = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/detectors/fingertip.toml");
+    let none = folder.path("curved.table");
+    let why = TACTOMO.refused(&["detector", "compile", curved, "--out", &none]);
+    assert!(why.contains("it is curved") && why.contains("`auto`"), "{why}");
+    assert!(!std::path::Path::new(&none).exists());
+}
+
+#[test]
 fn touches_go_through_their_file() {
     let folder = Folder::new("touches");
     let ring = r#"[{"centre_m": [0.002, 0.0], "shape": {"ring": {"radius_m": 0.01, "width_m": 0.002}}, "conductance_s": 0.001}]"#;

@@ -1,15 +1,16 @@
-//! `tactomo detector`: which detectors there are, what one is, whether a file is one.
+//! `tactomo detector`: which detectors there are, what one is, whether a file is one, and its table for a board.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use tactomo::detector::{Chosen, Detector, FOAMS, Foam, Stack, short};
+use tactomo::solve::{self, Problem};
 
 use super::as_built::AsBuiltArgs;
 use tactomo_cli::choice::DetectorArgs;
 use tactomo_cli::output::{self, NewFile, message};
 
-/// Lists, shows and checks detectors.
+/// Lists, shows, checks and compiles detectors.
 ///
 /// Examples:
 ///   tactomo detector list
@@ -17,6 +18,7 @@ use tactomo_cli::output::{self, NewFile, message};
 ///   tactomo detector show square-60 --toml          a file to start from
 ///   tactomo detector show square-60 --as-built 7    a file of one that may have been built by this description
 ///   tactomo detector check my.toml
+///   tactomo detector compile my.toml --out my.table    for a board that finds contacts by itself
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -40,6 +42,35 @@ enum Action {
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
     },
+    /// Writes the table from which a board finds up to three contacts by itself
+    Compile(CompileArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct CompileArgs {
+    /// Name of a preset, or a TOML file; one that was calibrated gives better contacts
+    #[arg(value_name = "NAME|FILE", default_value = Detector::DEFAULT)]
+    detector: Chosen,
+    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC or, joined by dots of glue, BB-5x5
+    #[arg(long, value_name = "A..D|STACK")]
+    material: Option<Stack>,
+    /// Writes the table there
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Replaces the file if it exists
+    #[arg(long, visible_alias = "force")]
+    overwrite: bool,
+    /// Prints `{detector, file, bytes, electrodes}` as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Compiled<'a> {
+    detector: &'a str,
+    file: &'a Path,
+    bytes: usize,
+    electrodes: usize,
 }
 
 #[derive(Debug, clap::Args)]
@@ -77,11 +108,26 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     match args.action {
         Action::List { json } => list(json),
         Action::Show(args) => show(args),
+        Action::Compile(args) => compile(args),
         Action::Check { files } => files.iter().try_for_each(|file| {
             let detector = Detector::read(file)?;
             Ok(output::print(&format!("{}: {}, {}", file.display(), detector.name, detector.summary()))?)
         }),
     }
+}
+
+fn compile(args: CompileArgs) -> anyhow::Result<()> {
+    let out = NewFile::new(&args.out, args.overwrite)?;
+    let detector = DetectorArgs { detector: Some(args.detector), material: args.material }.get()?;
+    let bytes = solve::compile(&Problem::of(&detector)?)?;
+    out.write(&bytes)?;
+    let (name, electrodes) = (&detector.name, detector.electrodes.len());
+    message!("compiled {name} into {}: {} bytes for {electrodes} electrodes", args.out.display(), bytes.len());
+    if args.json {
+        let told = Compiled { detector: name, file: &args.out, bytes: bytes.len(), electrodes };
+        output::print(&serde_json::to_string(&told)?)?;
+    }
+    Ok(())
 }
 
 fn list(json: bool) -> anyhow::Result<()> {

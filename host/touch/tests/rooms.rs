@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each room with those that it may use, all of which stand above it: so there are no cycles.
-const PLAN: [(&str, &[&str]); 26] = [
+const PLAN: [(&str, &[&str]); 27] = [
     ("gaussian", &[]),
     ("scanning", &[]),
     ("student", &[]),
@@ -36,6 +36,7 @@ const PLAN: [(&str, &[&str]); 26] = [
             "solve::after",
         ],
     ),
+    ("solve::methods::compiled", &["solve::answer", "solve::fit", "solve::problem", "solve::solver"]),
     ("solve::methods::shapes", &["solve::answer", "solve::fit", "solve::problem"]),
     ("solve::methods::image", &["solve::answer", "solve::fit", "solve::problem", "solve::solver"]),
     ("solve::methods::linear", &["solve::answer", "solve::fit", "solve::solver"]),
@@ -67,6 +68,7 @@ const PLAN: [(&str, &[&str]); 26] = [
             "solve::solver",
             "solve::after",
             "solve::health",
+            "solve::methods::compiled",
             "solve::methods::contacts",
             "solve::methods::image",
             "solve::methods::linear",

@@ -69,6 +69,8 @@ pub const JOBS: &[Job] = &[
         "contacts-built-20",
         "tactomo-lab study contacts --solver auto --scenes 60 --seed 40 --detector square-60 --as-built 20 --rub 20",
     ),
+    job("contacts-core", "tactomo-lab study contacts --solver core --detector square-60 --scenes 120 --seed 55"),
+    job("contacts-core-auto", "tactomo-lab study contacts --solver auto --detector square-60 --scenes 120 --seed 55"),
     job("materials", "tactomo-lab study materials --seed 1"),
     job("explain", "tactomo-lab study explain --seed 1"),
     job("samples", "tactomo-lab study samples --seed 1"),

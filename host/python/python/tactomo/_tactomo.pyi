@@ -40,6 +40,7 @@ __all__ = [
 _SolverName: TypeAlias = Literal[
     "auto",
     "contacts",
+    "core",
     "nonlinear",
     "bsbl",
     "tikhonov",

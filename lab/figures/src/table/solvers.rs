@@ -23,7 +23,7 @@ const CLASSES: [(&str, &str, bool); 15] = [
 ];
 
 pub(super) fn figures() -> Vec<Figure> {
-    [random(), random_built(), built(), speed(), rows(), unknowns(), surface()].concat()
+    [random(), random_built(), core(), built(), speed(), rows(), unknowns(), surface()].concat()
 }
 
 /// `auto` on random contacts.
@@ -89,6 +89,35 @@ fn random_built() -> Vec<Figure> {
     all
 }
 
+/// `core` on random contacts, and `auto` on the same.
+fn core() -> Vec<Figure> {
+    let mut all = Vec::new();
+    for (job, solver) in [("contacts-core", "core"), ("contacts-core-auto", "auto")] {
+        for count in 1..=5 {
+            let class = if count == 1 { "1 contact".to_owned() } else { format!("{count} contacts") };
+            let of = |field: &str, says: &str, path: &str| {
+                let (id, says) = (format!("{job}.{count}.{field}"), format!("{solver}, {class} on square-60: {says}"));
+                figure(job, id, says, format!("rows/class={class}/{path}"))
+            };
+            all.extend([
+                of("right", "all visible ones found and none invented", "scenes/all_found").per_cent().by(5.0),
+                of("misfit", "said not to be explained", "scenes/misfit").per_cent().by(5.0),
+                of("error", "error, median", "contacts/error_m/median").mm().share(0.15),
+                of("error-p90", "error, 90 % below", "contacts/error_m/high").mm().share(0.3),
+                of("within-1", "coordinates within one standard error", "contacts/place_within/0").per_cent().by(5.0),
+                of("within-2", "coordinates within two standard errors", "contacts/place_within/1").per_cent().by(5.0),
+                of("conductance-1", "conductances within one standard error", "contacts/conductance_within/0")
+                    .per_cent()
+                    .by(5.0),
+                of("conductance-2", "conductances within two standard errors", "contacts/conductance_within/1")
+                    .per_cent()
+                    .by(5.0),
+            ]);
+        }
+    }
+    all
+}
+
 /// Single presses and pairs on the reference detector as built.
 fn built() -> Vec<Figure> {
     let mut all = Vec::new();
@@ -142,9 +171,10 @@ fn surface() -> Vec<Figure> {
 }
 
 /// Solvers of `tradeoff`, with their defaults.
-const SOLVERS: [&str; 13] = [
+const SOLVERS: [&str; 14] = [
     "auto",
     "contacts",
+    "core",
     "network",
     "nonlinear",
     "bsbl",

@@ -5,7 +5,8 @@ const WISH_STAYS_MS = 400;
 
 // What each is for, in a few words: the list is read by people who know none of the names.
 const PURPOSE = {
-  auto: "contacts, shape or image, as needed", contacts: "fingers and points", nonlinear: "any shape, most exact",
+  auto: "contacts, shape or image, as needed", contacts: "fingers and points", core: "three points, as on a board",
+  nonlinear: "any shape, most exact",
   tikhonov: "quick image, any shape", "tikhonov-paper": "as in the paper", tsvd: "quick image, smoothest", noser: "quick image, even",
   laplace: "quick image, smooth", nonnegative: "image, never negative", tv: "image with sharp edges", bsbl: "image of few patches",
   kernel: "one contact, learned", network: "learned, uncalibrated",

@@ -2,6 +2,7 @@
 
 pub(crate) mod auto;
 pub(crate) mod comparisons;
+pub(crate) mod compiled;
 pub(crate) mod contacts;
 pub(crate) mod image;
 pub(crate) mod kernel;

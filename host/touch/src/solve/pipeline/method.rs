@@ -9,6 +9,7 @@ use crate::learned::network::{Network, NetworkError};
 use crate::solve::fit::lambda::Lambda;
 use crate::solve::methods::auto::Auto;
 use crate::solve::methods::comparisons::{Bsbl, Nonnegative, Tv};
+use crate::solve::methods::compiled::Compiled;
 use crate::solve::methods::contacts::{ContactSettings, Contacts};
 use crate::solve::methods::image::{Nonlinear, NonlinearSettings};
 use crate::solve::methods::kernel::KernelSolver;
@@ -36,6 +37,8 @@ pub enum Method {
     Auto,
     /// Fits a few contacts with the full contact physics.
     Contacts,
+    /// Up to three contacts from a compiled table, as on a board.
+    Core,
     /// Image with the full contact physics.
     Nonlinear,
     /// Sparse image of a few patches.
@@ -124,7 +127,7 @@ struct Row {
 }
 
 /// The methods, those that most people look for first.
-const TABLE: [Row; 13] = [
+const TABLE: [Row; 14] = [
     Row {
         method: Method::Auto,
         name: "auto",
@@ -144,6 +147,14 @@ const TABLE: [Row; 13] = [
             let most = if let Some(Parameter::MaxContacts(most)) = parameter { most } else { settings.most };
             Ok(Box::new(Contacts::new(problem, ContactSettings { most, ..settings })?))
         },
+    },
+    Row {
+        method: Method::Core,
+        name: "core",
+        explanation: "for boards without a computer, and to see here what they find: up to three contacts from a compiled table, with standard errors",
+        family: Family::Contacts,
+        parameter: None,
+        build: |problem, _| Ok(Box::new(Compiled::new(problem)?)),
     },
     Row {
         method: Method::Nonlinear,
@@ -338,7 +349,7 @@ impl Method {
         let stages = Stages::of(problem);
         // These take what each reading says into account by themselves.
         let stages = match self {
-            Self::Auto | Self::Contacts | Self::Nonlinear => stages,
+            Self::Auto | Self::Contacts | Self::Core | Self::Nonlinear => stages,
             _ => Stages { completed: Some(problem.clone()), ..stages },
         };
         Ok(Staged::new(stages, solver))

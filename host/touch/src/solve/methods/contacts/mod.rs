@@ -55,7 +55,7 @@ use crate::solve::fit::evidence::{Evidence, misfit_limit};
 use crate::solve::fit::linear::full_v;
 use crate::solve::fit::policy;
 use crate::solve::fit::spots::SpotModel;
-use crate::solve::fit::target::{Errors, Target};
+use crate::solve::fit::target::{Errors, PAD_ERROR, Target, model_error};
 use crate::solve::problem::Problem;
 use tactomo_physics::baseline::Leakage;
 use tactomo_physics::forward::spots::SpotFields;
@@ -91,15 +91,8 @@ impl ContactSettings {
     pub fn of(problem: &Problem) -> Self {
         let model_error = model_error(&*problem.model);
         // Five fingers and a palm.
-        Self { most: 6, radius_m: problem.usual_radius_m(), radius_deviation: 0.7, model_error, pad_error: 0.03 }
+        Self { most: 6, radius_m: problem.usual_radius_m(), radius_deviation: 0.7, model_error, pad_error: PAD_ERROR }
     }
-}
-
-/// Error of a forward model, as a share of the largest reading.
-fn model_error(model: &dyn ForwardModel) -> f64 {
-    // Against three times its nodes, a shell of 2000 is off by 0.0005 (curved) to 0.002 (0.4 mm of square-60), in the root of
-    // the mean square and but for the pads' own impedances; the slab by 0.0002 to 0.0005.
-    if model.name() == "shell" { 0.0015 } else { 0.0003 }
 }
 
 /// Square of readings of a single contact, without noise, over what it has to be for a contact to be looked for: where it is one, half of frames are taken

@@ -1,0 +1,118 @@
+//! `core`: the contacts that a board finds by itself, from a table that the detector was compiled to.
+
+mod between;
+mod table;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use tactomo_touch_core::{
+    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Says as CoreSays, Solver as Core, Table,
+};
+
+pub use self::table::{CompileError, compile};
+use crate::solve::answer::{Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
+use crate::solve::fit::policy;
+use crate::solve::problem::Problem;
+use crate::solve::solver::Solver;
+use tactomo_physics::causes::with_causes;
+use tactomo_physics::forward::ForwardError;
+use tactomo_physics::readings::{Readings, Says};
+
+/// `core`: up to three contacts, in `f32`, as on a board.
+pub struct Compiled {
+    bytes: Arc<[u8]>,
+    electrodes: usize,
+    drive_v: f64,
+    core: Core,
+}
+
+impl Compiled {
+    /// Compiles the problem's detector.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if it is curved, or there are too many electrodes for a table.
+    pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
+        let detector = problem.detector();
+        let refused = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
+        let bytes = compile(problem).map_err(|error| match error {
+            CompileError::Model(error) => error,
+            error => refused(with_causes(&error)),
+        })?;
+        Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
+        let (electrodes, drive_v) = (detector.electrodes.len(), detector.drive_v);
+        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Core::new() })
+    }
+
+    /// A reading as a board can give it (V): none is far beyond its drive. Numbers from elsewhere may be none in `f32`.
+    fn held(&self, volts: f64) -> f32 {
+        let most_v = 2.0 * self.drive_v;
+        (if volts.is_finite() { volts.clamp(-most_v, most_v) } else { volts }) as f32
+    }
+}
+
+impl Solver for Compiled {
+    fn name(&self) -> &'static str {
+        "core"
+    }
+
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
+        check_count(readings, self.electrodes)?;
+        let volts: Vec<_> = readings.volts().iter().map(|volts| self.held(*volts)).collect();
+        let says: Vec<_> = readings.all_say().iter().map(|says| core_says(*says)).collect();
+        let wrong = SolveError::Electrodes { found: readings.electrodes(), expected: self.electrodes };
+        // It was read, and checked, when it was compiled.
+        let table = Table::read_again(&self.bytes).map_err(|_| wrong.clone())?;
+        match self.core.solve(&table, &Frame { volts: &volts, says: &says }) {
+            Ok(answer) => Ok(solution(&answer)),
+            Err(FrameError::NotFinite { g, e }) => Err(SolveError::NotFinite { g, e }),
+            Err(_) => Err(wrong),
+        }
+    }
+
+    fn reset(&mut self) {
+        self.core.reset();
+    }
+}
+
+fn core_says(says: Says) -> CoreSays {
+    match says {
+        Says::Voltage => CoreSays::Voltage,
+        Says::AtMost => CoreSays::AtMost,
+        Says::AtLeast => CoreSays::AtLeast,
+        Says::Nothing => CoreSays::Nothing,
+    }
+}
+
+fn solution(answer: &Answer) -> Solution {
+    let flags = answer.flags;
+    Solution {
+        contacts: answer.contacts().iter().map(found).collect(),
+        residual: Some(f64::from(answer.residual)),
+        flags: Flags {
+            saturated: flags.has(CoreFlags::SATURATED),
+            misfit: flags.has(CoreFlags::MISFIT) || flags.has(CoreFlags::MORE),
+            ..Flags::default()
+        },
+        ..Solution::default()
+    }
+}
+
+fn found(contact: &Contact) -> FoundContact {
+    let [x_m, y_m] = contact.sigma_m.map(f64::from);
+    let uncertainty = Uncertainty {
+        x_m,
+        y_m,
+        correlation: f64::from(contact.correlation),
+        conductance_s: f64::from(contact.conductance_sigma_s),
+    };
+    let is_known = f64::from(contact.radius_sigma_m / contact.radius_m) < policy::known_radius_deviation();
+    FoundContact {
+        apparent_conductance_s: Some(f64::from(contact.apparent_conductance_s)),
+        radius_m: is_known.then_some(f64::from(contact.radius_m)),
+        uncertainty: Some(uncertainty).filter(|errors| errors.x_m.is_finite() && errors.y_m.is_finite()),
+        id: Some(contact.id),
+        ..FoundContact::flat(f64::from(contact.x_m), f64::from(contact.y_m), f64::from(contact.conductance_s))
+    }
+}

@@ -1,0 +1,162 @@
+use super::*;
+use crate::solve::pipeline::method::Method;
+use tactomo_physics::detector::{Detector, electrode_grid};
+use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
+use tactomo_physics::scene::Contact as Disc;
+use tactomo_physics::simulate::{Noise, measured};
+
+fn detector() -> Detector {
+    Detector::preset("square-60").unwrap().taken_as_exact()
+}
+
+fn disc(x_m: f64, y_m: f64, radius_m: f64, sheets: f64) -> Disc {
+    Disc::flat(x_m, y_m, radius_m, sheets * detector().sheet_conductance_s())
+}
+
+/// Readings of discs by a finer slab, with noise.
+fn touched(discs: &[Disc], noise: &mut Noise) -> Readings {
+    let detector = detector();
+    let slab = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
+    measured(&readings_v(&slab.impedance_ohm(discs).unwrap(), &detector), &detector.adc, noise)
+}
+
+fn off_m(found: &FoundContact, disc: &Disc) -> f64 {
+    (found.x_m - disc.x_m).hypot(found.y_m - disc.y_m)
+}
+
+#[test]
+fn contacts_are_where_the_full_physics_has_them() {
+    let mut solver = Compiled::new(&Problem::of(&detector()).unwrap()).unwrap();
+    let mut noise = Noise::new(3);
+    // Light and firm, narrow and wide, in the middle and cut by a wall; how far they may be off (m).
+    let alone = [
+        (disc(0.004, -0.011, 0.002, 0.1), 6e-4),
+        (disc(-0.015, 0.008, 0.0055, 1.0), 1e-4),
+        (disc(0.0117, 0.0161, 0.0059, 1.65), 1e-4),
+        (disc(-0.0032, 0.0256, 0.0027, 38.0), 3e-4),
+        (disc(-0.024, 0.002, 0.0015, 0.3), 6e-4),
+        (disc(0.0276, 0.0181, 0.003, 6.0), 1.5e-3),
+    ];
+    for (disc, most_m) in alone {
+        solver.reset();
+        let solution = solver.solve(&touched(&[disc], &mut noise)).unwrap();
+        let [found] = &solution.contacts[..] else { panic!("{disc:?} {solution:?}") };
+        assert!(off_m(found, &disc) < most_m && !solution.flags.misfit, "{disc:?} {found:?}");
+        let (log, errors) = ((found.conductance_s / disc.conductance_s).ln(), found.uncertainty.unwrap());
+        assert!(log.abs() < 4.0 * errors.conductance_s / found.conductance_s, "{log} {disc:?} {found:?}");
+    }
+    let three =
+        [disc(0.008, 0.009, 0.0028, 0.11), disc(-0.0068, -0.0238, 0.0016, 0.45), disc(-0.0186, -0.0046, 0.006, 3.77)];
+    for count in 2..=3 {
+        solver.reset();
+        let solution = solver.solve(&touched(&three[..count], &mut noise)).unwrap();
+        assert_eq!((solution.contacts.len(), solution.flags.misfit), (count, false), "{solution:?}");
+        for disc in &three[..count] {
+            let nearest_m = solution.contacts.iter().map(|found| off_m(found, disc)).fold(f64::MAX, f64::min);
+            assert!(nearest_m < 1.5e-3, "{disc:?} {solution:?}");
+        }
+    }
+}
+
+#[test]
+fn more_than_three_contacts_are_flagged_as_long_as_they_touch() {
+    let mut solver = Compiled::new(&Problem::of(&detector()).unwrap()).unwrap();
+    let five = [(-0.02, -0.02), (0.02, -0.02), (-0.02, 0.02), (0.02, 0.02), (0.0, 0.0)];
+    let five = five.map(|(x_m, y_m)| disc(x_m, y_m, 0.0025, 0.5));
+    let mut noise = Noise::new(3);
+    // What is not searched again in each frame is said again.
+    for _ in 0..3 {
+        let solution = solver.solve(&touched(&five, &mut noise)).unwrap();
+        assert!(solution.contacts.len() == 3 && solution.flags.misfit, "{solution:?}");
+    }
+    for count in [2, 3] {
+        let solution = solver.solve(&touched(&five[..count], &mut noise)).unwrap();
+        assert!(solution.contacts.len() == count && !solution.flags.misfit, "{count}: {solution:?}");
+    }
+}
+
+#[test]
+fn errors_of_conductances_are_as_large_as_they_are_said_to_be() {
+    let mut solver = Compiled::new(&Problem::of(&detector()).unwrap()).unwrap();
+    let (mut noise, mut random) = (Noise::new(7), fastrand::Rng::with_seed(7));
+    let slab = Slab::with_resolution(&detector(), Resolution::FINE).unwrap();
+    let scenes = 60;
+    let sigmas = (0..scenes).map(|_| {
+        let [x_m, y_m] = [0, 1].map(|_| 0.052 * (random.f64() - 0.5));
+        let disc = disc(x_m, y_m, 1e-3 * 6f64.powf(random.f64()), 0.02 * 1e3f64.powf(random.f64()));
+        let clean = readings_v(&slab.impedance_ohm(&[disc]).unwrap(), &detector());
+        solver.reset();
+        let found = solver.solve(&measured(&clean, &detector().adc, &mut noise)).unwrap().contacts[0];
+        let errors = found.uncertainty.unwrap();
+        (found.conductance_s / disc.conductance_s).ln().abs() * found.conductance_s / errors.conductance_s
+    });
+    let sigmas: Vec<f64> = sigmas.collect();
+    let within = |most: f64| sigmas.iter().filter(|sigma| **sigma < most).count();
+    // Of normal errors 41 and 57 would be: what the fields are off by is not noise.
+    assert!((30..=55).contains(&within(1.0)) && within(2.0) >= 48, "{} {}", within(1.0), within(2.0));
+}
+
+#[test]
+fn standard_errors_are_about_those_of_many_frames() {
+    let mut solver = Compiled::new(&Problem::of(&detector()).unwrap()).unwrap();
+    let (mut noise, disc) = (Noise::new(5), disc(0.004, -0.011, 0.0025, 0.05));
+    let clean = touched(&[disc], &mut Noise::new(1));
+    let frames = 60;
+    let squares = (0..frames).map(|_| {
+        solver.reset();
+        let read = measured(&clean, &detector().adc, &mut noise);
+        let found = solver.solve(&read).unwrap().contacts[0];
+        let errors = found.uncertainty.unwrap();
+        [(found.x_m - disc.x_m) / errors.x_m, (found.y_m - disc.y_m) / errors.y_m].map(|off| off * off)
+    });
+    let mean = squares.map(|[x, y]| 0.5 * (x + y)).sum::<f64>() / f64::from(frames);
+    // The frame that the others are made of has noise of its own.
+    assert!((0.4..4.0).contains(&mean), "{mean}");
+}
+
+#[test]
+fn a_described_detector_is_trusted_less_than_an_exact_one() {
+    let model_share = |detector: &Detector| {
+        let bytes = compile(&Problem::of(detector).unwrap()).unwrap();
+        f64::from(Table::read(&bytes).unwrap().head().model_share)
+    };
+    let [exact, described] = [model_share(&detector()), model_share(&Detector::preset("square-60").unwrap())];
+    assert!(exact < 1e-3 && (0.01..0.2).contains(&described), "{exact} {described}");
+}
+
+#[test]
+fn tables_are_of_a_layout_and_of_a_size() {
+    let table = |detector: &Detector| compile(&Problem::of(&detector.taken_as_exact()).unwrap()).unwrap();
+    let square = table(&detector());
+    assert!((60_000..110_000).contains(&square.len()), "{}", square.len());
+    let mut other = detector();
+    other.electrodes[3].x_m += 1e-3;
+    let layout = |bytes: &[u8]| Table::read(bytes).unwrap().layout();
+    assert_ne!(layout(&square), layout(&table(&other)));
+    other.electrodes[3].x_m -= 1e-3;
+    other.layers[0].thickness_m *= 1.01;
+    assert_eq!(layout(&square), layout(&table(&other)), "what is calibrated is of the same layout");
+}
+
+#[test]
+fn what_has_no_table_says_why() {
+    let square = Detector::preset("square-60").unwrap();
+    let many = Detector { electrodes: electrode_grid(0.06, 0.06, 6, 6, 0.002), ..square };
+    let problem = Problem::of(&many).unwrap();
+    let why = Method::Core.build(&problem).err().unwrap().to_string();
+    assert!(why.contains("36 electrodes") && why.contains("32 at most"), "{why}");
+}
+
+#[test]
+fn gains_and_offsets_are_those_of_the_channels() {
+    let mut detector = detector();
+    (detector.electrodes[5].gain, detector.electrodes[5].unseen_offset_v) = (1.02, -0.003);
+    let bytes = compile(&Problem::of(&detector).unwrap()).unwrap();
+    let table = Table::read(&bytes).unwrap();
+    for volts in [0.0, 0.001, 0.4] {
+        let mut readings = Readings::from_fn(16, |_, _| volts);
+        readings.correct_channels(&detector);
+        let ours = f64::from(table.corrected_v(5, volts as f32));
+        assert!((ours - readings.at(2, 5)).abs() < 1e-6, "{ours} {}", readings.at(2, 5));
+    }
+}

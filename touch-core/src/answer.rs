@@ -1,0 +1,87 @@
+//! What is found in a frame.
+
+use crate::circuit::MAX_CONTACTS;
+use crate::fit::Work;
+
+/// One contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contact {
+    /// Number that it keeps from frame to frame.
+    pub id: u32,
+    /// Centre, x (m).
+    pub x_m: f32,
+    /// Centre, y (m).
+    pub y_m: f32,
+    /// Conductance (S).
+    pub conductance_s: f32,
+    /// Standard error of the conductance (S).
+    pub conductance_sigma_s: f32,
+    /// Conductance of it in series with the current that crowds under it (S): of a firm contact readings give that far better.
+    pub apparent_conductance_s: f32,
+    /// Radius (m), as far as the readings tell it; else the usual one.
+    pub radius_m: f32,
+    /// Standard error of the radius (m).
+    pub radius_sigma_m: f32,
+    /// Standard errors of x and y (m).
+    pub sigma_m: [f32; 2],
+    /// Correlation of the errors of x and y.
+    pub correlation: f32,
+}
+
+/// What to know before an answer is believed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flags(u8);
+
+impl Flags {
+    /// There are more contacts than those that are told: another one would explain much of what they leave.
+    pub const MORE: Self = Self(1);
+    /// The readings are not those of the contacts, by more than noise and the table's own error.
+    pub const MISFIT: Self = Self(2);
+    /// Readings are at the end of the converter's range, or contacts conduct so well that more would change nothing.
+    pub const SATURATED: Self = Self(4);
+
+    /// Whether all of some flags are raised.
+    pub const fn has(self, flags: Self) -> bool {
+        self.0 & flags.0 == flags.0
+    }
+
+    /// As bits: 1 more, 2 misfit, 4 saturated.
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    pub(crate) fn raise(&mut self, flags: Self, if_so: bool) {
+        self.0 |= if if_so { flags.0 } else { 0 };
+    }
+}
+
+/// The answer for a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Answer {
+    contacts: [Contact; MAX_CONTACTS],
+    count: usize,
+    /// What to know before it is believed.
+    pub flags: Flags,
+    /// Root mean square of what is left of the readings, in standard deviations of the noise and the table's own error.
+    pub residual: f32,
+    /// What it took.
+    pub work: Work,
+}
+
+impl Answer {
+    /// The contacts, those with the lowest numbers first.
+    pub fn contacts(&self) -> &[Contact] {
+        &self.contacts[..self.count.min(MAX_CONTACTS)]
+    }
+
+    pub(crate) fn of(work: Work) -> Self {
+        Self { work, ..Self::default() }
+    }
+
+    pub(crate) fn add(&mut self, contact: Contact) {
+        if let Some(free) = self.contacts.get_mut(self.count) {
+            *free = contact;
+            self.count += 1;
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! A frame of readings, and how far each may be from those of a model.
+
+use crate::table::{MAX_ELECTRODES, Table};
+
+/// What a reading says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Says {
+    /// A voltage.
+    #[default]
+    Voltage,
+    /// The voltage is at most this.
+    AtMost,
+    /// The voltage is at least this.
+    AtLeast,
+    /// Nothing: it was not read.
+    Nothing,
+}
+
+/// Readings of a frame, less the baseline: electrode `e` while `g` is grounded is at `g n + e`.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'f> {
+    /// Voltages (V).
+    pub volts: &'f [f32],
+    /// What each says; empty where all are voltages.
+    pub says: &'f [Says],
+}
+
+/// Why a frame has no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// Another number of readings than the table's electrodes give.
+    #[error("a frame of {found} readings, but the table is for {expected}")]
+    Length {
+        /// In the frame.
+        found: usize,
+        /// Of the table.
+        expected: usize,
+    },
+    /// A reading that is no number.
+    #[error("the reading of electrode {e} with electrode {g} grounded is not a finite number")]
+    NotFinite {
+        /// Grounded electrode.
+        g: usize,
+        /// Electrode read.
+        e: usize,
+    },
+}
+
+impl<'f> Frame<'f> {
+    /// A frame whose readings are all voltages.
+    pub fn of_volts(volts: &'f [f32]) -> Self {
+        Self { volts, says: &[] }
+    }
+
+    /// Checks that it can be one of a table's detector.
+    ///
+    /// # Errors
+    /// [`FrameError`] if it cannot.
+    pub fn check(&self, table: &Table<'_>) -> Result<(), FrameError> {
+        let n = table.electrodes();
+        let expected = n * n;
+        let counts = [self.volts.len(), if self.says.is_empty() { expected } else { self.says.len() }];
+        if let Some(found) = counts.into_iter().find(|count| *count != expected) {
+            return Err(FrameError::Length { found, expected });
+        }
+        match (0..expected).find(|i| self.says_at(*i) != Says::Nothing && !self.volts[*i].is_finite()) {
+            Some(i) => Err(FrameError::NotFinite { g: i / n, e: i % n }),
+            None => Ok(()),
+        }
+    }
+
+    pub(crate) fn says_at(&self, index: usize) -> Says {
+        self.says.get(index).copied().unwrap_or_default()
+    }
+
+    /// What a reading is of a touch (V): nothing where it is below what the converter reads.
+    pub(crate) fn touch_v(&self, index: usize) -> f32 {
+        match self.says_at(index) {
+            Says::Voltage | Says::AtLeast => self.volts[index],
+            Says::AtMost | Says::Nothing => 0.0,
+        }
+    }
+}
+
+/// What is known of the errors of a frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Errors {
+    /// Variance of each reading by itself (V2).
+    pub variance_v2: f32,
+    /// Share of the readings' distance from the drive that an error of a grounded pad's own impedance changes.
+    pub pads: [f32; MAX_ELECTRODES],
+    /// Readings that count as voltages.
+    pub count: usize,
+    /// Whether any is at the upper end of the converter's range.
+    pub is_full: bool,
+}
+
+impl Errors {
+    pub fn of(frame: &Frame<'_>, table: &Table<'_>) -> Self {
+        let (head, n) = (table.head(), table.electrodes());
+        let mut errors = Self::default();
+        let mut largest_v: f32 = 0.0;
+        for g in 0..n {
+            let mut largest_of_row_v: f32 = 0.0;
+            for i in g * n..(g + 1) * n {
+                let is_full = frame.says_at(i) == Says::AtLeast || frame.touch_v(i) >= head.full_v;
+                errors.is_full |= is_full;
+                errors.count += usize::from(frame.says_at(i) == Says::Voltage && !is_full);
+                largest_of_row_v = largest_of_row_v.max(frame.touch_v(i));
+            }
+            errors.pads[g] = head.pad_share * largest_of_row_v / head.drive_v;
+            largest_v = largest_v.max(largest_of_row_v);
+        }
+        let model_v = head.model_share * largest_v;
+        errors.variance_v2 = head.noise_v * head.noise_v + model_v * model_v;
+        errors
+    }
+
+    /// What an error of a grounded pad's own impedance changes in a reading (V).
+    pub fn pad_v(&self, table: &Table<'_>, frame: &Frame<'_>, g: usize, e: usize) -> f32 {
+        let below_v = table.head().drive_v - frame.touch_v(g * table.electrodes() + e);
+        if e == g { 0.0 } else { self.pads[g] * below_v.max(0.0) }
+    }
+}
+
+/// By how much a reading is more than a model's (V), of a bound by as much as that breaks it; `None` if it says nothing of that.
+pub(crate) fn left_v(frame: &Frame<'_>, index: usize, full_v: f32, predicted_v: f32) -> Option<f32> {
+    let left_v = frame.volts[index] - predicted_v;
+    match frame.says_at(index) {
+        Says::Voltage if frame.volts[index] < full_v => Some(left_v),
+        Says::AtMost if left_v < 0.0 => Some(left_v),
+        Says::AtLeast if left_v > 0.0 => Some(left_v),
+        _ => None,
+    }
+}

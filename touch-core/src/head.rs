@@ -1,0 +1,130 @@
+//! Numbers of a detector and its board in a table.
+
+use core::f64::consts::PI;
+
+use crate::table::{Floats, RADII, TableError};
+
+/// Numbers of a detector and its board.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Head {
+    /// Lowest x of the grid (m).
+    pub left_m: f32,
+    /// Lowest y of the grid (m).
+    pub bottom_m: f32,
+    /// Side of a cell along x (m).
+    pub step_x_m: f32,
+    /// Side of a cell along y (m).
+    pub step_y_m: f32,
+    /// Usual radius of a contact (m).
+    pub radius_m: f32,
+    /// Radius of the small and of the wide disc (m).
+    pub radii_m: [f32; RADII],
+    /// Distance that the spline over distances begins at (m).
+    pub near_m: f32,
+    /// Ways from there through one of its intervals: step of `ln r`.
+    pub ln_step: f32,
+    /// Voltage of the driving layer (V).
+    pub drive_v: f32,
+    /// Resistance of a switch (ohm).
+    pub on_resistance_ohm: f32,
+    /// Standard deviation of a reading by noise and rounding (V).
+    pub noise_v: f32,
+    /// Error of the fields, as a share of the largest reading.
+    pub model_share: f32,
+    /// Error of a pad's own impedance, as a share of it.
+    pub pad_share: f32,
+    /// Readings from here on say nothing (V).
+    pub full_v: f32,
+    /// Conductance of a square of the layer (S).
+    pub sheet_s: f32,
+    /// Conductivity at the top (S/m).
+    pub top_s_per_m: f32,
+}
+
+/// `8 / (3 pi^2)`: own field of a disc of even current on a deep layer of conductivity `s`, as a mean over it, over `1 / (s R)`.
+pub const EVEN_SPREADING: f64 = 8.0 / (3.0 * PI * PI);
+
+impl Head {
+    /// Own field of a disc of even current on a deep layer (ohm).
+    pub(crate) fn even_ohm(&self, radius_m: f32) -> f32 {
+        EVEN_SPREADING as f32 / (self.top_s_per_m * radius_m)
+    }
+
+    /// Its numbers in the order in which they are stored.
+    pub fn numbers(&self) -> [f32; 17] {
+        [
+            self.left_m,
+            self.bottom_m,
+            self.step_x_m,
+            self.step_y_m,
+            self.radius_m,
+            self.radii_m[0],
+            self.radii_m[1],
+            self.near_m,
+            self.ln_step,
+            self.drive_v,
+            self.on_resistance_ohm,
+            self.noise_v,
+            self.model_share,
+            self.pad_share,
+            self.full_v,
+            self.sheet_s,
+            self.top_s_per_m,
+        ]
+    }
+
+    /// Reads it from the numbers in their order.
+    ///
+    /// # Errors
+    /// [`TableError::Number`] if one makes no sense.
+    pub(crate) fn read(floats: Floats<'_>) -> Result<Self, TableError> {
+        let mut index = 0;
+        let mut next = || {
+            index += 1;
+            floats.at(index - 1)
+        };
+        let head = Self {
+            left_m: next(),
+            bottom_m: next(),
+            step_x_m: next(),
+            step_y_m: next(),
+            radius_m: next(),
+            radii_m: [next(), next()],
+            near_m: next(),
+            ln_step: next(),
+            drive_v: next(),
+            on_resistance_ohm: next(),
+            noise_v: next(),
+            model_share: next(),
+            pad_share: next(),
+            full_v: next(),
+            sheet_s: next(),
+            top_s_per_m: next(),
+        };
+        head.check()
+    }
+
+    fn check(self) -> Result<Self, TableError> {
+        let above = |value: f32| value > 0.0 && value.is_finite();
+        let not_below = |value: f32| value >= 0.0 && value.is_finite();
+        let all = [
+            ("place", self.left_m.is_finite() && self.bottom_m.is_finite()),
+            ("step of the grid", above(self.step_x_m) && above(self.step_y_m)),
+            ("usual radius", above(self.radius_m)),
+            ("radii", above(self.radii_m[0]) && above(self.radii_m[1] - self.radii_m[0])),
+            ("distances", above(self.near_m) && above(self.ln_step)),
+            ("drive", above(self.drive_v)),
+            ("on-resistance", not_below(self.on_resistance_ohm)),
+            ("noise", above(self.noise_v)),
+            ("error of the fields", not_below(self.model_share)),
+            ("error of pads", not_below(self.pad_share)),
+            ("full scale", above(self.full_v)),
+            ("sheet conductance", above(self.sheet_s)),
+            ("conductivity", above(self.top_s_per_m)),
+        ];
+        match all.iter().find(|(_, sound)| !sound) {
+            Some((what, _)) => Err(TableError::Number { what }),
+            None => Ok(self),
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! Contacts of a tomographic tactile detector, from a table that it was compiled to: place, conductance and standard errors of up to three.
+//!
+//! For microcontrollers: no operating system, no allocation, `f32`. `tactomo detector compile` writes the [table] of any flat detector; it is
+//! read where it lies, in flash.
+//!
+//! - [`table`]: the format, and its reader; [`Contents`] writes it
+//! - [`spline`]: what its fields are interpolated with
+//! - `circuit`: readings of a few contacts, and their derivatives
+//! - `normal`, `fit`: least squares
+//! - `scan`: where contacts may be
+//! - [`Solver`]: contacts from frame to frame
+
+#![no_std]
+#![allow(
+    clippy::needless_range_loop,
+    reason = "an index is that of an electrode, or a parameter, in several arrays at once"
+)]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where"))]
+
+#[cfg(test)]
+extern crate std;
+
+mod answer;
+mod circuit;
+mod contents;
+mod crc;
+mod fit;
+mod frame;
+mod head;
+mod normal;
+#[cfg(test)]
+mod samples;
+mod scan;
+mod solver;
+pub mod spline;
+pub mod table;
+#[cfg(test)]
+mod tests;
+
+pub use self::answer::{Answer, Contact, Flags};
+pub use self::circuit::MAX_CONTACTS;
+pub use self::contents::Contents;
+pub use self::fit::Work;
+pub use self::frame::{Frame, FrameError, Says};
+pub use self::solver::Solver;
+pub use self::table::{MAX_ELECTRODES, Table, TableError};

@@ -1,0 +1,258 @@
+//! Normal equations of contacts, summed up row by row of a frame, and steps by them.
+
+use crate::circuit::{Circuit, MAX_CONTACTS, PerElectrode};
+use crate::frame::{Errors, Frame, left_v};
+use crate::table::{MAX_ELECTRODES, Table};
+
+/// Parameters of a contact: its place along x and y in usual radii, the logarithm of its resistance, that of its radius.
+pub(crate) const PARAMETERS: usize = 4;
+/// Of all contacts.
+pub(crate) const MOST: usize = PARAMETERS * MAX_CONTACTS;
+/// Standard deviation of the logarithm of a radius before anything is read: a factor of two.
+pub(crate) const ANY_RADIUS: f32 = 0.7;
+/// The same while the number of contacts is not known yet: too few would be made as wide as may be, and lead away from those that are missing.
+pub(crate) const USUAL_RADIUS: f32 = 0.15;
+
+/// A vector over parameters.
+pub(crate) type Vector = [f32; MOST];
+
+/// Sum of squares of what contacts leave of a frame, with its derivatives.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Normal {
+    /// How many parameters.
+    pub count: usize,
+    /// `J' W J`: lower triangle.
+    pub matrix: [Vector; MOST],
+    /// `J' W r`.
+    pub pull: Vector,
+    /// `r' W r`.
+    pub cost: f32,
+    /// The same of what was known of radii before.
+    pub known: f32,
+}
+
+impl Normal {
+    pub const EMPTY: Self = Self { count: 0, matrix: [[0.0; MOST]; MOST], pull: [0.0; MOST], cost: 0.0, known: 0.0 };
+
+    /// What contacts leave of a frame.
+    ///
+    /// An error of a grounded pad's own impedance changes its row by `p`, so that the row's covariance is `v I + p p'`, whose inverse is
+    /// `(I - p p' / (v + p'p)) / v` (Sherman and Morrison, 1950).
+    pub fn sum_up(
+        &mut self,
+        table: &Table<'_>,
+        circuit: &Circuit,
+        frame: &Frame<'_>,
+        errors: &Errors,
+        radius_deviation: f32,
+    ) {
+        *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
+        let (head, n) = (table.head(), table.electrodes());
+        let mut volts = [0.0; MAX_ELECTRODES];
+        for g in 0..n {
+            circuit.row_v(table, g, &mut volts);
+            let (mut by_pad, mut left_by_pad, mut pad) = ([0.0; MOST], 0.0, 0.0);
+            let slopes = RowSlopes::new(circuit, g, head.drive_v, head.radius_m);
+            for e in 0..n {
+                let index = g * n + e;
+                let Some(left_v) = left_v(frame, index, head.full_v, volts[e]) else { continue };
+                let mut slope = [0.0; MOST];
+                slopes.of_reading(circuit, e, volts[e] / head.drive_v, &mut slope);
+                let by_pad_v = errors.pad_v(table, frame, g, e);
+                self.cost += left_v * left_v;
+                left_by_pad += left_v * by_pad_v;
+                pad += by_pad_v * by_pad_v;
+                for i in 0..self.count {
+                    self.pull[i] += slope[i] * left_v;
+                    by_pad[i] += slope[i] * by_pad_v;
+                    for j in 0..=i {
+                        self.matrix[i][j] += slope[i] * slope[j];
+                    }
+                }
+            }
+            let less = 1.0 / (errors.variance_v2 + pad);
+            self.cost -= less * left_by_pad * left_by_pad;
+            for i in 0..self.count {
+                self.pull[i] -= less * by_pad[i] * left_by_pad;
+                for j in 0..=i {
+                    self.matrix[i][j] -= less * by_pad[i] * by_pad[j];
+                }
+            }
+        }
+        self.weigh(1.0 / errors.variance_v2);
+        self.add_known(circuit, radius_deviation);
+    }
+
+    fn weigh(&mut self, weight: f32) {
+        self.cost *= weight;
+        for i in 0..self.count {
+            self.pull[i] *= weight;
+            (0..=i).for_each(|j| self.matrix[i][j] *= weight);
+        }
+    }
+
+    fn add_known(&mut self, circuit: &Circuit, radius_deviation: f32) {
+        let weight = 1.0 / (radius_deviation * radius_deviation);
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            let (i, ln_radius) = (PARAMETERS * k + 3, one.spot.ln_radius);
+            self.matrix[i][i] += weight;
+            self.pull[i] -= weight * ln_radius;
+            self.known += weight * ln_radius * ln_radius;
+        }
+    }
+
+    /// What is to become least.
+    pub fn objective(&self) -> f32 {
+        self.cost + self.known
+    }
+
+    /// The step to the least sum of squares, damped, and by how much that falls in the linear theory; `None` where nothing is determined.
+    pub fn step(&self, damping: f32) -> Option<(Vector, f32)> {
+        let factor = Factor::of(self, damping)?;
+        let step = factor.solved(self.pull);
+        let gain = (0..self.count).map(|i| step[i] * self.pull[i]).sum();
+        Some((step, gain))
+    }
+
+    /// Covariance of the parameters; `None` where they are not determined.
+    pub fn covariance(&self) -> Option<[Vector; MOST]> {
+        let factor = Factor::of(self, 1e-6)?;
+        let mut all = [[0.0; MOST]; MOST];
+        for (i, column) in all.iter_mut().enumerate().take(self.count) {
+            let mut unit = [0.0; MOST];
+            unit[i] = 1.0;
+            *column = factor.solved(unit);
+        }
+        Some(all)
+    }
+}
+
+/// What the derivatives of a row's readings have in common.
+pub(crate) struct RowSlopes {
+    /// Volts by ohm.
+    per_ohm: f32,
+    /// Places are in usual radii (m).
+    unit_m: f32,
+    /// Of each contact: its current, its slopes and its derivative by radius at the grounded electrode.
+    current: [f32; MAX_CONTACTS],
+    along: [[f32; 3]; MAX_CONTACTS],
+    /// Change of the load by each parameter (ohm).
+    own_ohm: Vector,
+}
+
+impl RowSlopes {
+    pub fn new(circuit: &Circuit, g: usize, drive_v: f32, unit_m: f32) -> Self {
+        let mut all = Self {
+            per_ohm: -drive_v / circuit.loads_ohm[g],
+            unit_m,
+            current: [0.0; MAX_CONTACTS],
+            along: [[0.0; 3]; MAX_CONTACTS],
+            own_ohm: [0.0; MOST],
+        };
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            all.current[k] = one.currents[g];
+            all.along[k] = along(one.slopes_ohm_per_m.each_ref(), &one.by_radius_ohm, g, unit_m);
+            let [x, y, radius] = all.along[k].map(|along| -2.0 * along * all.current[k]);
+            let ohm = one.ohm * all.current[k] * all.current[k];
+            all.own_ohm[PARAMETERS * k..PARAMETERS * (k + 1)].copy_from_slice(&[x, y, ohm, radius]);
+        }
+        all
+    }
+
+    /// Derivatives of a reading, of which `share` of the drive is predicted.
+    fn of_reading(&self, circuit: &Circuit, e: usize, share: f32, slope: &mut Vector) {
+        let of_load = 1.0 - share;
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            let (current, mine) = (one.currents[e], self.current[k]);
+            let here = along(one.slopes_ohm_per_m.each_ref(), &one.by_radius_ohm, e, self.unit_m);
+            let first = PARAMETERS * k;
+            let change = |d: usize| -(here[d] * mine + current * self.along[k][d]);
+            let changes_ohm = [change(0), change(1), one.ohm * current * mine, change(2)];
+            for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
+                slope[first + i] = self.per_ohm * (change_ohm - of_load * self.own_ohm[first + i]);
+            }
+        }
+    }
+}
+
+impl RowSlopes {
+    /// Adds to `products` those of the row's derivatives with some volts, by what of the drive is predicted at each electrode.
+    pub fn add_products(&self, circuit: &Circuit, volts: &[f32], shares: &[f32], products: &mut Vector) {
+        let of_load: f32 = volts.iter().zip(shares).map(|(volts, share)| volts * (1.0 - share)).sum();
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            let with = |values: &PerElectrode| volts.iter().zip(values).map(|(a, b)| a * b).sum::<f32>();
+            let current = with(&one.currents);
+            let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| self.unit_m * with(slopes));
+            let (mine, first) = (self.current[k], PARAMETERS * k);
+            let change = |d: usize, with: f32| -(with * mine + current * self.along[k][d]);
+            let changes = [change(0, x), change(1, y), one.ohm * current * mine, change(2, with(&one.by_radius_ohm))];
+            for (i, change) in changes.into_iter().enumerate() {
+                products[first + i] += self.per_ohm * (change - of_load * self.own_ohm[first + i]);
+            }
+        }
+    }
+}
+
+/// What a step of a contact's place along x, along y and of its radius changes in an electrode's field at it (ohm).
+fn along(slopes_ohm_per_m: [&PerElectrode; 2], by_radius_ohm: &PerElectrode, e: usize, unit_m: f32) -> [f32; 3] {
+    [unit_m * slopes_ohm_per_m[0][e], unit_m * slopes_ohm_per_m[1][e], by_radius_ohm[e]]
+}
+
+/// Cholesky factor of a damped normal matrix whose diagonal is scaled to one.
+pub(crate) struct Factor {
+    count: usize,
+    rows: [Vector; MOST],
+    scale: Vector,
+}
+
+impl Factor {
+    /// Of a normal matrix; `None` where that is not positive definite.
+    pub fn of(normal: &Normal, damping: f32) -> Option<Self> {
+        let count = normal.count;
+        let mut scale = [0.0; MOST];
+        for i in 0..count {
+            let own = normal.matrix[i][i];
+            if !(own > 0.0 && own.is_finite()) {
+                return None;
+            }
+            scale[i] = 1.0 / libm::sqrtf(own);
+        }
+        let mut rows = [[0.0; MOST]; MOST];
+        for i in 0..count {
+            for j in 0..=i {
+                let own = if i == j { 1.0 + damping } else { normal.matrix[i][j] * scale[i] * scale[j] };
+                let sum: f32 = own - (0..j).map(|k| rows[i][k] * rows[j][k]).sum::<f32>();
+                rows[i][j] = match i == j {
+                    // Below that, rounding has the say.
+                    true if sum > 1e-6 => libm::sqrtf(sum),
+                    true => return None,
+                    false => sum / rows[j][j],
+                };
+            }
+        }
+        Some(Self { count, rows, scale })
+    }
+
+    /// Square of a vector in the metric of the matrix's inverse.
+    pub fn square(&self, mut right: Vector) -> f32 {
+        self.forward(&mut right);
+        right.iter().take(self.count).map(|value| value * value).sum()
+    }
+
+    fn forward(&self, right: &mut Vector) {
+        for i in 0..self.count {
+            let sum: f32 = (0..i).map(|j| self.rows[i][j] * right[j]).sum();
+            right[i] = (right[i] * self.scale[i] - sum) / self.rows[i][i];
+        }
+    }
+
+    fn solved(&self, mut right: Vector) -> Vector {
+        self.forward(&mut right);
+        for i in (0..self.count).rev() {
+            let sum: f32 = (i + 1..self.count).map(|j| self.rows[j][i] * right[j]).sum();
+            right[i] = (right[i] - sum) / self.rows[i][i];
+        }
+        (0..self.count).for_each(|i| right[i] *= self.scale[i]);
+        right
+    }
+}

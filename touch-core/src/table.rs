@@ -1,0 +1,388 @@
+//! The table that a detector is compiled to, and how it is read.
+//!
+//! All numbers are little endian; `f32` is IEEE 754. Lengths in m, resistances in ohm, voltages in V. Electrodes are `n`, coefficients of
+//! splines over the detector `nx` by `ny`, of the one over distances `k`.
+//!
+//! | offset | type | what |
+//! |---|---|---|
+//! | 0 | 4 bytes | [`MAGIC`] |
+//! | 4 | u16 | [`VERSION`] |
+//! | 6 | u16 | `n`, 2 to [`MAX_ELECTRODES`] |
+//! | 8 | u16 | `nx`, 4 to [`MAX_SIDE`] |
+//! | 10 | u16 | `ny`, likewise |
+//! | 12 | u16 | `k`, 4 to [`MAX_KNOTS`] |
+//! | 14 | u16 | zero |
+//! | 16 | u32 | bytes of the whole table |
+//! | 20 | u32 | CRC-32 of the electrodes' places, three `f32` each (m): tables of another layout have another |
+//! | 24 | 17 f32 | [`Head`], in the order of its fields |
+//! | 92 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
+//! | | 2 n f32 | of each channel the gain, and what it reads too much though at rest it does not show (V) |
+//! | | k f32 | coefficients of the spline `d` of `N` by distance (ohm), over `ln r` |
+//! | | (n + 1)(n + 2) / 2 f32 | `Q`, symmetric, as the fields above (1/ohm, none, ohm) |
+//! | | 2 (n + 2) x 2 f32 | of each quantity, its value at code 0 and the step of a code |
+//! | | ceil((nx - 3)(ny - 3) / 8) bytes | which cells are on the detector: bit `i % 8` of byte `i / 8`, rows of `y`, that of the lowest `x` first |
+//! | | 2 nx ny (n + 2) i16 | codes of the coefficients: rows of `y`, in them of `x`, for each all quantities |
+//! | last 4 | u32 | CRC-32 (ISO HDLC) of all before |
+//!
+//! Quantities are the fields of the electrodes `u_e(x) = N(e, x)` (ohm) as means over a small disc about `x`, the disc's own field (ohm) less `8 / (3 pi^2 s R)`
+//! that it has on a deep layer of the top's conductivity `s`, and the share of it that is on the detector; then all of these for a wide disc. They are linear in the
+//! square of the radius. Fields are in the gauge in which the electrodes' mean is zero everywhere. A quantity at a
+//! place is a uniform cubic B-spline: the cell `(i, j)` between coefficients `i + 1` and `i + 2` of `x` begins at `left_m + i step_m`.
+//!
+//! Fields between two places are `N(x, y) = d(|x - y|) + b(x)' Q b(y)` with `b = (u, 1)`: a part that is the same everywhere, and one that walls and pads
+//! make, which is smooth.
+
+use crate::crc::crc32;
+pub use crate::head::{EVEN_SPREADING, Head};
+use crate::spline::{interval, weights};
+
+/// First bytes of a table.
+pub const MAGIC: [u8; 4] = *b"TCtb";
+/// Version of the format.
+pub const VERSION: u16 = 1;
+/// Most electrodes.
+pub const MAX_ELECTRODES: usize = 32;
+/// Most coefficients along a side.
+pub const MAX_SIDE: usize = 128;
+/// Most coefficients over distances.
+pub const MAX_KNOTS: usize = 64;
+/// Quantities beside the fields of the electrodes: a disc's own field, and its share on the detector.
+pub const OTHERS: usize = 2;
+/// Radii that quantities are stored for.
+pub const RADII: usize = 2;
+
+const HEAD: usize = 92;
+const QUANTITIES: usize = MAX_ELECTRODES + OTHERS;
+
+/// Why bytes are no table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// They begin with something else.
+    #[error("these bytes are no table of a detector; `tactomo detector compile` writes one")]
+    Magic,
+    /// Another version.
+    #[error("the table has version {found}, this program reads {VERSION}; compile the detector again")]
+    Version {
+        /// Of the table.
+        found: u16,
+    },
+    /// There are more or fewer than the table says, or than its counts need.
+    #[error("the table has {found} bytes where {expected} are needed; it was cut or is damaged")]
+    Length {
+        /// There are.
+        found: usize,
+        /// Needed.
+        expected: usize,
+    },
+    /// Damaged.
+    #[error("the table's checksum is {found:#010x}, that of its bytes {expected:#010x}; it is damaged")]
+    Checksum {
+        /// In the table.
+        found: u32,
+        /// Of the bytes.
+        expected: u32,
+    },
+    /// A count that is out of range.
+    #[error("the table says {found} for {what}, which is not from {least} to {most}")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// In the table.
+        found: usize,
+        /// At least.
+        least: usize,
+        /// At most.
+        most: usize,
+    },
+    /// A number that makes no sense.
+    #[error("the table's {what} makes no sense")]
+    Number {
+        /// Its name.
+        what: &'static str,
+    },
+}
+
+/// A table, borrowed from flash or a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    head: Head,
+    layout: u32,
+    electrodes: usize,
+    sides: [usize; 2],
+    pads: Floats<'a>,
+    channels: Floats<'a>,
+    distances: Floats<'a>,
+    walls: Floats<'a>,
+    codes: Floats<'a>,
+    mask: &'a [u8],
+    coefficients: &'a [u8],
+}
+
+/// Numbers as they are stored.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Floats<'a>(&'a [[u8; 4]]);
+
+impl Floats<'_> {
+    pub fn at(self, index: usize) -> f32 {
+        self.0.get(index).map_or(0.0, |bytes| f32::from_le_bytes(*bytes))
+    }
+
+    /// An element of a symmetric matrix.
+    fn of_pair(self, a: usize, b: usize) -> f32 {
+        let (high, low) = if a < b { (b, a) } else { (a, b) };
+        self.at(high * (high + 1) / 2 + low)
+    }
+
+    fn are_finite(self) -> bool {
+        (0..self.0.len()).all(|index| self.at(index).is_finite())
+    }
+}
+
+/// Takes parts off the front of the bytes that are left.
+struct Parts<'a>(&'a [u8]);
+
+impl<'a> Parts<'a> {
+    fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (part, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(part)
+    }
+
+    fn floats(&mut self, count: usize) -> Option<Floats<'a>> {
+        Some(Floats(self.bytes(4 * count)?.as_chunks().0))
+    }
+}
+
+/// Bytes of a table with such counts.
+pub const fn bytes_of(electrodes: usize, sides: [usize; 2], knots: usize) -> usize {
+    let pairs = electrodes * (electrodes + 1) / 2 + (electrodes + 1) * (electrodes + 2) / 2;
+    let quantities = RADII * (electrodes + OTHERS);
+    let floats = pairs + 2 * electrodes + knots + 2 * quantities;
+    let cells = (sides[0] - 3) * (sides[1] - 3);
+    HEAD + 4 * floats + cells.div_ceil(8) + 2 * sides[0] * sides[1] * quantities + 4
+}
+
+/// All quantities of a disc.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    /// Values: fields of the electrodes (ohm), the disc's own (ohm), its share.
+    pub value: [f32; QUANTITIES],
+    /// Derivatives by x and y (1/m).
+    pub slope: [[f32; QUANTITIES]; 2],
+    /// Those of the wide disc less those of the small one.
+    pub wider: [f32; QUANTITIES],
+}
+
+impl Sample {
+    pub const NONE: Self = Self { value: [0.0; QUANTITIES], slope: [[0.0; QUANTITIES]; 2], wider: [0.0; QUANTITIES] };
+}
+
+impl<'a> Table<'a> {
+    /// Reads a table, and checks all that it says of itself.
+    ///
+    /// # Errors
+    /// [`TableError`] if the bytes are no whole, sound table of this version.
+    pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let table = Self::read_again(bytes)?;
+        let (content, last) = bytes.split_last_chunk().unwrap_or((bytes, &[0; 4]));
+        match (u32::from_le_bytes(*last), crc32(content)) {
+            (found, expected) if found == expected => Ok(table),
+            (found, expected) => Err(TableError::Checksum { found, expected }),
+        }
+    }
+
+    /// Reads a table that was read before, without its checksum, which takes as long as some frames.
+    ///
+    /// # Errors
+    /// As for [`read`](Self::read), but for the checksum.
+    pub fn read_again(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let u16_at = |at: usize| bytes.get(at..at + 2).map_or(0, |two| u16::from_le_bytes([two[0], two[1]]));
+        let u32_at = |at: usize| Floats(bytes.as_chunks().0).at(at / 4).to_bits();
+        if bytes.first_chunk() != Some(&MAGIC) {
+            return Err(TableError::Magic);
+        }
+        if u16_at(4) != VERSION {
+            return Err(TableError::Version { found: u16_at(4) });
+        }
+        let counted = |what, at, least, most| match usize::from(u16_at(at)) {
+            found if (least..=most).contains(&found) => Ok(found),
+            found => Err(TableError::Count { what, found, least, most }),
+        };
+        let electrodes = counted("electrodes", 6, 2, MAX_ELECTRODES)?;
+        let sides =
+            [counted("coefficients along x", 8, 4, MAX_SIDE)?, counted("coefficients along y", 10, 4, MAX_SIDE)?];
+        let knots = counted("coefficients over distances", 12, 4, MAX_KNOTS)?;
+        let expected = bytes_of(electrodes, sides, knots);
+        let found = bytes.len();
+        if found != expected || u32_at(16) as usize != expected {
+            return Err(TableError::Length { found, expected });
+        }
+        let cut = || TableError::Length { found: bytes.len(), expected };
+        let mut parts = Parts(bytes);
+        parts.bytes(24).ok_or_else(cut)?;
+        let head = Head::read(parts.floats(17).ok_or_else(cut)?)?;
+        let table = Self {
+            head,
+            layout: u32_at(20),
+            electrodes,
+            sides,
+            pads: parts.floats(electrodes * (electrodes + 1) / 2).ok_or_else(cut)?,
+            channels: parts.floats(2 * electrodes).ok_or_else(cut)?,
+            distances: parts.floats(knots).ok_or_else(cut)?,
+            walls: parts.floats((electrodes + 1) * (electrodes + 2) / 2).ok_or_else(cut)?,
+            codes: parts.floats(2 * RADII * (electrodes + OTHERS)).ok_or_else(cut)?,
+            mask: parts.bytes(((sides[0] - 3) * (sides[1] - 3)).div_ceil(8)).ok_or_else(cut)?,
+            coefficients: parts.bytes(2 * RADII * sides[0] * sides[1] * (electrodes + OTHERS)).ok_or_else(cut)?,
+        };
+        table.check()
+    }
+
+    /// Checks that all numbers are numbers.
+    fn check(self) -> Result<Self, TableError> {
+        let all = [
+            ("fields between electrodes", self.pads),
+            ("gains and offsets", self.channels),
+            ("fields by distance", self.distances),
+            ("fields of walls", self.walls),
+            ("steps of codes", self.codes),
+        ];
+        let gains_are_sound = (0..self.electrodes).all(|e| self.channels.at(2 * e) > 0.0);
+        match all.into_iter().find(|(_, floats)| !floats.are_finite()) {
+            Some((what, _)) => Err(TableError::Number { what }),
+            None if !gains_are_sound => Err(TableError::Number { what: "gains" }),
+            None => Ok(self),
+        }
+    }
+
+    /// The detector's and the board's numbers.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// What stands for the electrodes' places: the same for all tables of a layout.
+    pub fn layout(&self) -> u32 {
+        self.layout
+    }
+
+    /// How many electrodes.
+    pub fn electrodes(&self) -> usize {
+        self.electrodes
+    }
+
+    /// A voltage less the baseline as its channel should have read it (V): an offset below zero is cut off where there is nothing, so that the smallest
+    /// readings are lifted by what they are at most.
+    pub fn corrected_v(&self, e: usize, volts: f32) -> f32 {
+        let (gain, offset_v) = (self.channels.at(2 * e), self.channels.at(2 * e + 1));
+        (volts - offset_v.max(-volts.max(0.0))) / gain
+    }
+
+    /// Field between two electrodes (ohm).
+    pub(crate) fn pads_ohm(&self, e: usize, g: usize) -> f32 {
+        self.pads.of_pair(e, g)
+    }
+
+    /// Cells along x and y.
+    pub(crate) fn cells(&self) -> [usize; 2] {
+        self.sides.map(|side| side - 3)
+    }
+
+    /// Whether a place is on the detector (m).
+    pub fn holds(&self, x_m: f32, y_m: f32) -> bool {
+        let ([i, j], _) = self.cell(x_m, y_m);
+        let index = j * self.cells()[0] + i;
+        self.mask.get(index / 8).is_some_and(|byte| byte >> (index % 8) & 1 == 1)
+    }
+
+    /// The nearest place of the rectangle that the grid covers (m).
+    pub(crate) fn held(&self, [x_m, y_m]: [f32; 2]) -> [f32; 2] {
+        let [columns, rows] = self.cells();
+        let right_m = self.head.left_m + columns as f32 * self.head.step_x_m;
+        let top_m = self.head.bottom_m + rows as f32 * self.head.step_y_m;
+        [x_m.max(self.head.left_m).min(right_m), y_m.max(self.head.bottom_m).min(top_m)]
+    }
+
+    /// The cell of a place, and the shares of the ways through it.
+    fn cell(&self, x_m: f32, y_m: f32) -> ([usize; 2], [f32; 2]) {
+        let [columns, rows] = self.cells();
+        let (i, x) = interval((x_m - self.head.left_m) / self.head.step_x_m, columns);
+        let (j, y) = interval((y_m - self.head.bottom_m) / self.head.step_y_m, rows);
+        ([i, j], [x, y])
+    }
+
+    /// All codes of a coefficient.
+    fn coefficient(&self, i: usize, j: usize) -> &'a [[u8; 2]] {
+        let count = RADII * (self.electrodes + OTHERS);
+        let start = 2 * (j * self.sides[0] + i) * count;
+        self.coefficients.get(start..start + 2 * count).map_or(&[], |bytes| bytes.as_chunks().0)
+    }
+
+    /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives.
+    pub(crate) fn sample(&self, [x_m, y_m]: [f32; 2], wide: f32, sample: &mut Sample) {
+        let count = self.electrodes + OTHERS;
+        let ([i, j], [x, y]) = self.cell(x_m, y_m);
+        let (along_x, along_y) = (weights(x), weights(y));
+        let per_m = [1.0 / self.head.step_x_m, 1.0 / self.head.step_y_m];
+        *sample = Sample::NONE;
+        for row in 0..4 {
+            for column in 0..4 {
+                let value = along_x.value[column] * along_y.value[row];
+                let slope_x = along_x.slope[column] * along_y.value[row] * per_m[0];
+                let slope_y = along_x.value[column] * along_y.slope[row] * per_m[1];
+                let codes = self.coefficient(i + column, j + row);
+                let (small, large) = codes.split_at(count.min(codes.len()));
+                for (index, (small, large)) in small.iter().zip(large).enumerate() {
+                    let [small, large] = [self.decoded(index, *small), self.decoded(count + index, *large)];
+                    let code = small + wide * (large - small);
+                    sample.value[index] += value * code;
+                    sample.slope[0][index] += slope_x * code;
+                    sample.slope[1][index] += slope_y * code;
+                    sample.wider[index] += value * (large - small);
+                }
+            }
+        }
+    }
+
+    /// The value that a code of a quantity stands for.
+    fn decoded(&self, quantity: usize, code: [u8; 2]) -> f32 {
+        self.codes.at(2 * quantity) + self.codes.at(2 * quantity + 1) * f32::from(i16::from_le_bytes(code))
+    }
+
+    /// Fields of the electrodes at the middle of a cell, roughly, as means of the coefficients about it; returns the own field of a disc of the usual radius there.
+    pub(crate) fn rough(&self, i: usize, j: usize, fields_ohm: &mut [f32; MAX_ELECTRODES]) -> f32 {
+        let corners = [(1, 1), (2, 1), (1, 2), (2, 2)].map(|(x, y)| self.coefficient(i + x, j + y));
+        let mean = |quantity: usize| {
+            let codes = corners.iter().filter_map(|codes| codes.get(quantity));
+            let sum: i32 = codes.map(|code| i32::from(i16::from_le_bytes(*code))).sum();
+            self.codes.at(2 * quantity) + 0.25 * self.codes.at(2 * quantity + 1) * sum as f32
+        };
+        (0..self.electrodes).for_each(|e| fields_ohm[e] = mean(e));
+        mean(self.electrodes) + self.head.even_ohm(self.head.radius_m)
+    }
+
+    /// The middle of a cell (m).
+    pub(crate) fn middle_m(&self, i: usize, j: usize) -> [f32; 2] {
+        let Head { left_m, bottom_m, step_x_m, step_y_m, .. } = self.head;
+        [left_m + (i as f32 + 0.5) * step_x_m, bottom_m + (j as f32 + 0.5) * step_y_m]
+    }
+
+    /// The part of the field between places that goes by their distance (m): its value (ohm), and its derivative by that (ohm/m).
+    pub(crate) fn by_distance_ohm(&self, distance_m: f32) -> (f32, f32) {
+        let Head { near_m, ln_step, .. } = self.head;
+        // Nearer than that there is no second contact.
+        let distance_m = distance_m.max(near_m);
+        let (first, t) = interval(libm::logf(distance_m / near_m) / ln_step, self.distances.0.len() - 3);
+        let weights = weights(t);
+        let sum = |weights: &[f32; 4]| (0..4).map(|k| weights[k] * self.distances.at(first + k)).sum::<f32>();
+        (sum(&weights.value), sum(&weights.slope) / (ln_step * distance_m))
+    }
+
+    /// `Q b` of the fields at a place.
+    pub(crate) fn by_walls(&self, fields_ohm: &[f32], products: &mut [f32; MAX_ELECTRODES + 1]) {
+        let n = self.electrodes;
+        for (row, product) in products.iter_mut().enumerate().take(n + 1) {
+            let sum: f32 = fields_ohm.iter().take(n).enumerate().map(|(s, u)| self.walls.of_pair(row, s) * u).sum();
+            *product = sum + self.walls.of_pair(row, n);
+        }
+    }
+}
