@@ -14,7 +14,7 @@ use crate::stage::in_front_of;
 use crate::states::STATES;
 
 /// The check of accessibility, if the variable `TACTOMO_AXE` names its file (`axe.min.js` of the npm package axe-core), as `.ci/run tests` does.
-fn axe() -> Result<Option<String>> {
+pub fn axe() -> Result<Option<String>> {
     let Some(path) = std::env::var_os("TACTOMO_AXE") else {
         std::io::stderr().write_all(b"skipped: TACTOMO_AXE names no axe.min.js of axe-core\n")?;
         return Ok(None);
@@ -23,7 +23,7 @@ fn axe() -> Result<Option<String>> {
 }
 
 /// What axe-core finds, with the elements.
-async fn findings(page: &Page, axe: &str) -> Result<Vec<String>> {
+pub async fn findings(page: &Page, axe: &str) -> Result<Vec<String>> {
     page.run(&format!("{axe}; return 0")).await?;
     let script = "const done = arguments[0];
         axe.run(document, { resultTypes: ['violations'] }).then(({ violations }) => done(violations.map(({ id, help, nodes }) =>

@@ -14,6 +14,7 @@ mod raw;
 mod script;
 mod seen;
 mod server;
+mod several;
 mod stage;
 mod states;
 mod view;

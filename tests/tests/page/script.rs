@@ -114,7 +114,7 @@ impl Drop for Script {
     }
 }
 
-fn publish(
+pub fn publish(
     snapshots: watch::Sender<Arc<Snapshot>>,
     now: Arc<Mutex<Snapshot>>,
     sequence: Arc<AtomicU64>,
@@ -143,7 +143,7 @@ pub fn answer(sequence: u64, readings: Readings, solution: Solution) -> TouchEve
 }
 
 /// A regular mesh over the whole detector.
-fn grid(detector: &Detector) -> ImageMesh {
+pub fn grid(detector: &Detector) -> ImageMesh {
     let [[left, bottom], [right, top]] = detector.outline.bounds();
     let along = |low: f64, high: f64, i: u32| low + (high - low) * f64::from(i) / f64::from(NODES - 1);
     let nodes_m: Vec<[f64; 2]> = (0..NODES)

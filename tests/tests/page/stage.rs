@@ -37,6 +37,19 @@ pub fn in_front_of<T: Behind>(
     start: impl FnOnce() -> Result<T>,
     test: impl AsyncFnOnce(&Stage<T>) -> Result<()>,
 ) -> Result<()> {
+    opened(start, async |stage| {
+        let ready =
+            stage.browser.until("frames", |told| told.text("state") == "streaming" && told.number("updates") > 5.0);
+        ready.await?;
+        test(stage).await
+    })
+}
+
+/// The same, whatever page there is.
+pub fn opened<T: Behind>(
+    start: impl FnOnce() -> Result<T>,
+    test: impl AsyncFnOnce(&Stage<T>) -> Result<()>,
+) -> Result<()> {
     /// One page at a time: there is one window, and frame rates are compared.
     static TURN: Mutex<()> = Mutex::new(());
     if !chromium::is_here()? {
@@ -48,14 +61,8 @@ pub fn in_front_of<T: Behind>(
     let behind = start()?;
     chromium.block_on(async {
         let stage = Stage { browser: chromium.open(&behind.url()).await?, behind };
-        let outcome = played(&stage, test).await;
+        let outcome = test(&stage).await;
         let left = stage.browser.leave().await;
         outcome.and(left)
     })
-}
-
-async fn played<T>(stage: &Stage<T>, test: impl AsyncFnOnce(&Stage<T>) -> Result<()>) -> Result<()> {
-    let ready = stage.browser.until("frames", |told| told.text("state") == "streaming" && told.number("updates") > 5.0);
-    ready.await?;
-    test(stage).await
 }

@@ -5,6 +5,9 @@ import { Tile } from "./tile.js";
 import { write } from "./words.js";
 
 const names = await (await fetch("detectors.json")).json();
+const known = JSON.stringify(names);
+// Time between two looks at whether another program has taken the address (ms).
+const LOOK_EVERY = 2000;
 const box = document.getElementById("tiles");
 const tiles = names.map((name) => new Tile(name, theme(), () => tell()));
 box.append(...tiles.map((tile) => tile.element));
@@ -31,6 +34,13 @@ function arrange() {
   // Where all together would be too small, the page scrolls.
   box.style.gridTemplateColumns = side < SMALLEST ? `repeat(auto-fill, minmax(${SMALLEST}px, 1fr))` : `repeat(${best}, ${side}px)`;
 }
+
+// Another program may show other detectors, or one alone, whose page is another.
+setInterval(async () => {
+  if (tiles.every((tile) => tile.isLive)) return;
+  const answer = await fetch("detectors.json").catch(() => null);
+  if (answer && (!answer.ok || JSON.stringify(await answer.json()) !== known)) location.reload();
+}, LOOK_EVERY);
 
 arrange();
 window.addEventListener("resize", arrange);

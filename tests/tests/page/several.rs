@@ -1,0 +1,159 @@
+//! The page of several detectors in a browser.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::sync_channel;
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use anyhow::{Context, Result, ensure};
+use serde_json::json;
+use tactomo::detector::Detector;
+use tactomo::readings::Readings;
+use tactomo::run::{LinkState, Snapshot};
+use tactomo::sink::page::{Listen, PageSetup, Server, Shown};
+use tactomo::solve::{FoundContact, Solution};
+use tokio::sync::watch;
+
+use crate::access::{axe, findings};
+use crate::script::{answer, grid, publish};
+use crate::stage::{Behind, opened};
+
+/// A page of detectors that are alike: one contact on the first, on the second two, and so on.
+struct Several {
+    server: Server,
+    snapshots: Vec<Arc<Mutex<Snapshot>>>,
+    stop: Arc<AtomicBool>,
+    publishers: Vec<JoinHandle<()>>,
+}
+
+impl Several {
+    fn start(names: &[&str]) -> Result<Self> {
+        Self::at(0, names)
+    }
+
+    fn at(port: u16, names: &[&str]) -> Result<Self> {
+        let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
+        let stop = Arc::<AtomicBool>::default();
+        let (mut shown, mut snapshots, mut publishers) = (Vec::new(), Vec::new(), Vec::new());
+        for (name, count) in names.iter().zip(1..) {
+            let (sender, receiver) = watch::channel(Arc::default());
+            let setup = PageSetup {
+                mesh: grid(&detector),
+                detector: detector.clone(),
+                usual_radius_m: 0.0025,
+                source: "a scripted board".to_owned(),
+                finger: None,
+            };
+            let (requests, _) = sync_channel(1);
+            shown.push(Shown { name: (*name).to_owned(), setup, snapshots: receiver, requests });
+            let contacts = (0..count).map(|k| FoundContact::flat(0.008 * f64::from(k) - 0.01, 0.005, 1e-3)).collect();
+            let solution = Solution { contacts, ..Solution::default() };
+            let touch = answer(0, Readings::from_fn(16, |_, _| 0.0), solution);
+            let snapshot =
+                Snapshot { link: LinkState::Streaming, answer: Some(Arc::new(touch)), ..Snapshot::default() };
+            let snapshot = Arc::new(Mutex::new(snapshot));
+            publishers.push(publish(sender, Arc::clone(&snapshot), Arc::<AtomicU64>::default(), Arc::clone(&stop)));
+            snapshots.push(snapshot);
+        }
+        let server = Server::start(Listen { port: Some(port), ..Listen::default() }, shown)?;
+        Ok(Self { server, snapshots, stop, publishers })
+    }
+}
+
+impl Behind for Several {
+    fn url(&self) -> String {
+        self.server.url()
+    }
+}
+
+impl Drop for Several {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        for publisher in self.publishers.drain(..) {
+            // A panic in it has been reported.
+            let _ = publisher.join();
+        }
+    }
+}
+
+/// What the tiles say, each with its name and where it leads.
+const TILES: &str = "return [...document.querySelectorAll('a.tile')].map((tile) => [tile.querySelector('strong').textContent, \
+    tile.querySelector('.muted').textContent, tile.getAttribute('href')])";
+
+#[test]
+fn a_tile_tells_of_its_own_detector_and_opens_its_page() -> Result<()> {
+    opened(
+        || Several::start(&["thumb", "index"]),
+        async |stage| {
+            let tiles = json!([["thumb", "1 contact", "thumb/"], ["index", "2 contacts", "index/"]]);
+            stage.browser.shows(TILES, |told| *told == tiles).await?;
+            let text = "return document.getElementById('state-text').textContent";
+            stage.browser.shows(text, |told| told == "2 detectors live, 2 touched").await?;
+            // Each is drawn: no canvas is empty.
+            let drawn =
+                "return [...document.querySelectorAll('a.tile canvas')].every((canvas) => canvas.getContext('2d')
+                .getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0))";
+            stage.browser.shows(drawn, |told| *told == true).await?;
+            // One that is lost says so, and the other goes on.
+            stage.behind.snapshots[0].lock().expect("no test panics with it").link =
+                LinkState::Lost("unplugged".to_owned());
+            stage.browser.shows(text, |told| told == "1 of 2 detectors live, 1 touched").await?;
+            stage.browser.run("document.querySelector('a.tile:last-child').click()").await?;
+            stage
+                .browser
+                .shows("return document.title", |title| title.as_str().is_some_and(|t| t.contains("index")))
+                .await?;
+            let told = stage.browser.until("frames", |told| told.text("state") == "streaming").await?;
+            ensure!(told.places_mm().len() == 2, "{:?}", told.places_mm());
+            Ok(())
+        },
+    )
+}
+
+#[test]
+fn axe_finds_nothing_on_the_tiles() -> Result<()> {
+    let Some(axe) = axe()? else { return Ok(()) };
+    opened(
+        || Several::start(&["thumb", "index", "middle"]),
+        async |stage| {
+            stage.browser.shows(TILES, |told| told.as_array().is_some_and(|tiles| tiles.len() == 3)).await?;
+            let mut all = Vec::new();
+            for theme in ["light", "dark"] {
+                stage.browser.run(&format!("document.documentElement.dataset.theme = '{theme}'")).await?;
+                for finding in findings(&stage.browser, &axe).await? {
+                    all.push(format!("{theme}: {finding}"));
+                }
+            }
+            ensure!(all.is_empty(), "{}", all.join("\n"));
+            Ok(())
+        },
+    )
+}
+
+#[test]
+fn tiles_are_those_of_whichever_program_has_the_address() -> Result<()> {
+    opened(
+        || Ok(SeveralThenOthers(Mutex::new(Some(Several::start(&["thumb", "index"])?)))),
+        async |stage| {
+            stage.browser.shows(TILES, |told| told.as_array().is_some_and(|tiles| tiles.len() == 2)).await?;
+            let port = {
+                let mut first = stage.behind.0.lock().expect("no test panics with it");
+                first.take().context("the first program")?.server.port()
+            };
+            let _others = Several::at(port, &["palm", "wrist"])?;
+            let tiles = json!([["palm", "1 contact", "palm/"], ["wrist", "2 contacts", "wrist/"]]);
+            stage.browser.shows(TILES, |told| *told == tiles).await?;
+            Ok(())
+        },
+    )
+}
+
+/// A program that ends.
+struct SeveralThenOthers(Mutex<Option<Several>>);
+
+impl Behind for SeveralThenOthers {
+    fn url(&self) -> String {
+        let first = self.0.lock().expect("no test panics with it");
+        first.as_ref().map(Behind::url).unwrap_or_default()
+    }
+}
