@@ -8,7 +8,7 @@
 //! Two crystals differ by a rate that hardly changes, so the truth is a line between all lower and all upper bounds (as in Zhang, Liu and Xia,
 //! "Clock synchronization algorithms for network measurements", INFOCOM 2002, which has the upper ones only). The line that is farthest from all of
 //! them is taken. What is told as its error is how far any line that keeps the bounds can be from it: no deviation, but a bound, as sure as the
-//! crystals are within [`MOST_DRIFT`]. As in NTP's clock filter, the exchanges that were quickest count, and how long the others took does not matter.
+//! crystals' rates are within 100 ppm. As in NTP's clock filter, the exchanges that were quickest count, and how long the others took does not matter.
 
 use std::collections::VecDeque;
 use std::time::Duration;
