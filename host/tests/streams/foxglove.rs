@@ -37,13 +37,18 @@ fn json(socket: &mut Socket) -> Value {
     }
 }
 
-/// Subscription, log time (ns) and data of the next message.
-fn data(socket: &mut Socket) -> (u32, u64, Value) {
+/// Subscription, log time (ns) and data of the next message, for which the time was told at most 20 ms before.
+fn data(socket: &mut Socket, now_ns: &mut u64) -> (u32, u64, Value) {
     loop {
         if let Message::Binary(bytes) = socket.read().unwrap() {
+            if bytes[0] == 2 {
+                *now_ns = u64::from_le_bytes(bytes[1..].try_into().unwrap());
+                continue;
+            }
             assert_eq!(bytes[0], 1, "message data");
             let subscription = u32::from_le_bytes(bytes[1..5].try_into().unwrap());
             let log_time_ns = u64::from_le_bytes(bytes[5..13].try_into().unwrap());
+            assert!((*now_ns..*now_ns + 20_000_000).contains(&log_time_ns), "{now_ns} {log_time_ns}");
             return (subscription, log_time_ns, serde_json::from_slice(&bytes[13..]).unwrap());
         }
     }
@@ -60,7 +65,7 @@ fn an_app_sees_the_channels_and_gets_those_that_it_subscribes_to() {
     let (mut socket, response) = connect(&at, "foxglove.sdk.v1, foxglove.websocket.v1").unwrap();
     assert_eq!(response.headers()["sec-websocket-protocol"], "foxglove.websocket.v1");
     let info = json(&mut socket);
-    assert!(info["op"] == "serverInfo" && info["capabilities"] == json!([]), "{info}");
+    assert!(info["op"] == "serverInfo" && info["capabilities"] == json!(["time"]), "{info}");
     let advertised = json(&mut socket);
     assert_eq!(advertised["op"], "advertise");
     let channels = advertised["channels"].as_array().unwrap();
@@ -75,7 +80,8 @@ fn an_app_sees_the_channels_and_gets_those_that_it_subscribes_to() {
     let subscriptions: Vec<_> =
         channels.iter().zip(70..).map(|(c, id)| json!({"id": id, "channelId": c["id"]})).collect();
     say(&mut socket, &json!({"op": "subscribe", "subscriptions": subscriptions}));
-    let messages: Vec<_> = (0..40).map(|_| data(&mut socket)).collect();
+    let mut now_ns = 0;
+    let messages: Vec<_> = (0..40).map(|_| data(&mut socket, &mut now_ns)).collect();
     for (subscription, log_time_ns, message) in &messages {
         let stamp = match subscription {
             70 => {
@@ -96,7 +102,7 @@ fn an_app_sees_the_channels_and_gets_those_that_it_subscribes_to() {
     }
     // Less from now on; what was on its way may still come.
     say(&mut socket, &json!({"op": "unsubscribe", "subscriptionIds": [70, 71, 72]}));
-    let last: Vec<_> = (0..600).map(|_| data(&mut socket).0).collect();
+    let last: Vec<_> = (0..600).map(|_| data(&mut socket, &mut now_ns).0).collect();
     assert!(last[500..].iter().all(|subscription| *subscription == 73), "{last:?}");
     // What there is not is said, and ends nothing.
     say(&mut socket, &json!({"op": "unsubscribe", "subscriptionIds": [73]}));

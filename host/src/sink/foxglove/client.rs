@@ -14,11 +14,14 @@ use crate::sink::web::{Beat, Pulse, WebSocket};
 /// Talks to an app until it leaves or nothing more comes.
 pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
     let pulse = Pulse::new(shared.door.limits);
-    let mut app = App { shared, subscriptions: Vec::new(), tail: None, out: Vec::new(), pulse };
+    let mut app = App { shared, subscriptions: Vec::new(), tail: None, out: Vec::new(), told_ns: 0, pulse };
     // It fails when the app has gone, which is its business.
     let _ = app.talk(&mut socket).await;
     let _ = app.pulse.send(&mut socket, Message::Close(None)).await;
 }
+
+/// Time between two tellings of the time (ns): as often as a screen shows it.
+const TELL_EVERY_NS: u64 = 20_000_000;
 
 struct App<'a> {
     shared: &'a Shared,
@@ -26,6 +29,8 @@ struct App<'a> {
     /// While something is subscribed to.
     tail: Option<Tail>,
     out: Vec<u8>,
+    /// The time that was told last (ns since 1970).
+    told_ns: u64,
     pulse: Pulse,
 }
 
@@ -94,9 +99,14 @@ impl App<'_> {
     }
 
     async fn send(&mut self, socket: &mut WebSocket, delivery: &Delivery) -> io::Result<()> {
-        let Self { shared, subscriptions, tail: Some(tail), out, pulse } = self else { return Ok(()) };
+        let Self { shared, subscriptions, tail: Some(tail), out, told_ns, pulse } = self else { return Ok(()) };
+        let now_ns = delivery.event.frame.arrived.unix_ns;
+        if now_ns.saturating_sub(*told_ns) >= TELL_EVERY_NS {
+            *told_ns = now_ns;
+            tail.wait_for(pulse.send(socket, Message::binary(protocol::time(now_ns)))).await?;
+        }
         for (id, topic) in subscriptions {
-            protocol::begin_data(*id, delivery.event.frame.arrived.unix_ns, out);
+            protocol::begin_data(*id, now_ns, out);
             if shared.topics.write(*topic, delivery, out)? {
                 // Waits here while the app does not read; nobody else waits for it.
                 tail.wait_for(pulse.send(socket, Message::binary(out.clone()))).await?;

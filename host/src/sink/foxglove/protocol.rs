@@ -5,8 +5,9 @@ use serde_json::json;
 
 use crate::sink::channels::{Topic, Topics};
 
-/// First byte of a message with data.
+/// First byte of a message with data, and of one that tells the time.
 const MESSAGE_DATA: u8 = 1;
+const TIME: u8 = 2;
 
 /// What an app asks. What this server has nothing to do with is left out.
 #[derive(Debug, Deserialize, PartialEq)]
@@ -48,7 +49,7 @@ impl Subscription {
 
 /// What is said first.
 pub(super) fn server_info(session: &str) -> String {
-    json!({ "op": "serverInfo", "name": "tactomo", "capabilities": [], "sessionId": session }).to_string()
+    json!({ "op": "serverInfo", "name": "tactomo", "capabilities": ["time"], "sessionId": session }).to_string()
 }
 
 /// All channels, numbered from 1.
@@ -84,6 +85,11 @@ pub(super) fn begin_data(subscription: u32, log_time_ns: u64, out: &mut Vec<u8>)
     out.extend_from_slice(&log_time_ns.to_le_bytes());
 }
 
+/// What time it is for whoever looks at the data (ns since 1970): opcode and time.
+pub(super) fn time(now_ns: u64) -> Vec<u8> {
+    [&[TIME][..], &now_ns.to_le_bytes()].concat()
+}
+
 #[cfg(test)]
 mod tests {
     use tactomo_physics::detector::Detector;
@@ -112,5 +118,6 @@ mod tests {
         let mut out = vec![9; 40];
         begin_data(0x0102_0304, 0x1112_1314_1516_1718, &mut out);
         assert_eq!(out, [1, 4, 3, 2, 1, 0x18, 0x17, 0x16, 0x15, 0x14, 0x13, 0x12, 0x11]);
+        assert_eq!(time(0x1112_1314_1516_1718), [2, 0x18, 0x17, 0x16, 0x15, 0x14, 0x13, 0x12, 0x11]);
     }
 }
