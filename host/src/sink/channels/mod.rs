@@ -23,7 +23,7 @@ use super::feed::Delivery;
 use super::lines::Fields;
 
 /// What all places are relative to: the detector, with x and y from its middle.
-const FRAME: &str = "tactomo";
+pub(super) const FRAME: &str = "tactomo";
 
 /// A channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
