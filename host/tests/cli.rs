@@ -288,6 +288,8 @@ fn patches_of(skin: &str) -> (Vec<String>, Option<i32>, String) {
 fn the_detectors_of_a_skin_are_shown_each_by_its_name() {
     let (names, code, messages) = patches_of(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml"));
     assert_eq!((names.join(" "), code), ("index little middle ring thumb".to_owned(), Some(0)), "{messages}");
+    let (names, code, messages) = patches_of(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/gripper.toml"));
+    assert_eq!((names.join(" "), code), ("left right".to_owned(), Some(0)), "{messages}");
 }
 
 #[test]

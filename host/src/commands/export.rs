@@ -18,6 +18,7 @@ use tactomo::sink::Delivery;
 use tactomo::sink::channels::Messages;
 use tactomo::sink::lines::Fields;
 use tactomo::sink::mcap::McapFile;
+use tactomo::sink::mcap::ros2::Ros2File;
 use tactomo::solve::{Lambda, Method, Solution};
 
 use super::reconstruct::reader::{Input, Reader};
@@ -33,6 +34,7 @@ use tactomo_cli::output::{NewFile, ProgressBar, message};
 ///
 /// Examples:
 ///   tactomo export touch.tactomo --to mcap --out touch.mcap
+///   tactomo export touch.tactomo --to mcap --profile ros2 --out touch.mcap
 ///   tactomo export touch.tactomo --to npz --fields all --out touch.npz
 ///   tactomo export touch.tactomo --to csv --solver contacts --detector calibrated.toml --out touch.csv
 #[derive(Debug, clap::Args)]
@@ -66,6 +68,9 @@ pub struct Args {
     /// all [default: answer]
     #[arg(long, value_name = "FIELDS")]
     fields: Option<Fields>,
+    /// Whom the messages of an MCAP file are for [default: foxglove]
+    #[arg(long, value_enum, value_name = "PROFILE")]
+    profile: Option<Profile>,
     /// Makes a pointer of a contact, as live --pointer does: its motion, presses and clicks are the frames' events
     #[arg(long)]
     pointer: bool,
@@ -87,6 +92,16 @@ enum Form {
     Jsonl,
 }
 
+/// Whom the messages of an MCAP file are for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum Profile {
+    /// Foxglove's app and everything that reads JSON
+    #[default]
+    Foxglove,
+    /// ROS 2: sensor_msgs/PointCloud2, geometry_msgs/WrenchStamped and tactomo_msgs
+    Ros2,
+}
+
 impl Form {
     /// What it is called where it has fields of its own; `None` where they are chosen.
     fn with_fields_of_its_own(self) -> Option<&'static str> {
@@ -101,6 +116,7 @@ impl Form {
 /// What is written to.
 enum Out {
     Mcap(Box<McapFile<BufWriter<File>>>, NewFile),
+    Ros2(Box<Ros2File<BufWriter<File>>>, NewFile),
     Table(Writer),
 }
 
@@ -110,12 +126,15 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if let Some((form, _)) = args.to.with_fields_of_its_own().zip(args.fields) {
         bail!("leave out --fields: {form} has its own");
     }
+    if args.profile.is_some() && args.to != Form::Mcap {
+        bail!("leave out --profile: only an MCAP file has one");
+    }
     let file = NewFile::beside(&args.file, &args.out, args.overwrite)?;
     let open = |source| RecordError::Open { path: args.file.clone(), source };
     let mut recording = RecordReader::open(&args.file)?;
     let (header, last_us) = (recording.header().clone(), recording.last_time_us().map_err(open)?.unwrap_or_default());
     let mut reader = Reader::open(&args.input())?;
-    let mut out = Out::begin(args.to, file, &reader, &header.source)?;
+    let mut out = Out::begin((args.to, args.profile.unwrap_or_default()), file, &reader, &header.source)?;
     let fields = args.fields.unwrap_or_default();
     let mut bar = ProgressBar::new("s recorded", last_us / 1_000_000);
     let (mut lost, mut solved) = (0, 0_u64);
@@ -189,15 +208,20 @@ fn event(
 }
 
 impl Out {
-    fn begin(form: Form, file: NewFile, reader: &Reader, source: &str) -> anyhow::Result<Self> {
+    fn begin((form, profile): (Form, Profile), file: NewFile, reader: &Reader, source: &str) -> anyhow::Result<Self> {
         let form = match form {
             Form::Npz => FileForm::Npz,
             Form::Csv => FileForm::Csv,
             Form::Jsonl => FileForm::JsonLines,
             Form::Mcap => {
                 let (detector, mesh) = reader.measured().zip(reader.mesh()).context("an MCAP file needs a detector")?;
+                let about = streams::about(detector, source);
+                if profile == Profile::Ros2 {
+                    let mcap = Ros2File::new(file.create()?, detector, &about)?;
+                    return Ok(Self::Ros2(Box::new(mcap), file));
+                }
                 let messages = Messages::new(detector, mesh.clone(), reader.usual_radius_m());
-                let mcap = McapFile::new(file.create()?, vec![messages], streams::about(detector, source))?;
+                let mcap = McapFile::new(file.create()?, vec![messages], about)?;
                 return Ok(Self::Mcap(Box::new(mcap), file));
             }
         };
@@ -207,6 +231,7 @@ impl Out {
     fn write(&mut self, delivery: &Delivery, fields: Fields, number: u64) -> anyhow::Result<()> {
         match self {
             Self::Mcap(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
+            Self::Ros2(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
             Self::Table(writer) => {
                 let report = FrameReport { frame: Some(number), ..fields.of(delivery) };
                 writer.write(&report).map(drop)
@@ -217,6 +242,10 @@ impl Out {
     fn finish(self, reader: &Reader) -> anyhow::Result<()> {
         match self {
             Self::Mcap(mcap, file) => {
+                mcap.finish().context("cannot write the MCAP file")?;
+                file.finish()
+            }
+            Self::Ros2(mcap, file) => {
                 mcap.finish().context("cannot write the MCAP file")?;
                 file.finish()
             }

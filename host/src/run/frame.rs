@@ -46,6 +46,11 @@ impl Frame {
         let unix_ns = self.arrived.unix_ns.saturating_add_signed(-((delay_s * 1e9).round() as i64));
         Some(HostTime { unix_ns, error_ns: (error_s * 1e9).ceil() as u64 })
     }
+
+    /// When the middle of the scan was, or, where the board's clock is not known, when it came: nanoseconds since 1970 (ns).
+    pub fn stamp_ns(&self) -> u64 {
+        self.scanned().map_or(self.arrived.unix_ns, |scanned| scanned.unix_ns)
+    }
 }
 
 /// A moment by the clock of the machine that received a frame.

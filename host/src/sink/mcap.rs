@@ -1,6 +1,7 @@
 //! MCAP files (<https://mcap.dev>), for Foxglove's app and everything that reads them: the [channels](super::channels) in compressed chunks with
 //! an index.
 
+pub mod ros2;
 mod writer;
 
 use std::collections::BTreeMap;
@@ -19,6 +20,8 @@ use super::target::{DISK_PATIENCE, StreamError};
 const CHUNK_LASTS: Duration = Duration::from_millis(500);
 /// Size of a chunk before it is compressed, in bytes: half a second at 1200 answers a second without images is 4 MB.
 const CHUNK_BYTES: usize = 4 << 20;
+/// What writes the file, as its header says.
+const LIBRARY: &str = concat!("tactomo ", env!("CARGO_PKG_VERSION"));
 
 /// An MCAP file that is being written.
 pub struct McapFile<W: Write> {
@@ -37,13 +40,13 @@ impl<W: Write> McapFile<W> {
     /// # Errors
     /// If it cannot be written.
     pub fn new(out: W, detectors: Vec<Messages>, about: BTreeMap<String, String>) -> io::Result<Self> {
-        let mut writer = Writer::new(out, concat!("tactomo ", env!("CARGO_PKG_VERSION")), CHUNK_BYTES)?;
+        let mut writer = Writer::new(out, "", LIBRARY, CHUNK_BYTES)?;
         writer.metadata("tactomo", &about)?;
         let topics = Topics::new(detectors);
         let channel = |topic: Topic| {
             let data = &topic.channel.schema();
             let schema = Schema { name: topic.channel.schema_name(), encoding: "jsonschema", data };
-            (topic, writer.channel(&topics.name(topic), "json", &schema))
+            (topic, writer.channel(&topics.name(topic), "json", &[], &schema))
         };
         let channels = topics.all().map(channel).collect();
         Ok(Self { writer, topics, channels, sequence: 0, out: Vec::new(), flushed: Instant::now() })

@@ -6,3 +6,4 @@ mod foxglove;
 mod lines;
 mod program;
 mod python;
+mod ros2;

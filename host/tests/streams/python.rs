@@ -34,35 +34,44 @@ with open(sys.argv[1], "rb") as file:
         print(json.dumps([statistics.message_count, streamed, half, later, metadata]))
 "#;
 
-/// A Python with the package, made once; `None` with a line on stderr where there is no Python or no network.
-fn python() -> Option<PathBuf> {
+/// Packages that read MCAP files, and what they are imported by.
+const PACKAGES: [&str; 3] = ["mcap", "mcap-ros2-support", "rosbags"];
+const IMPORTS: &str = "import mcap.reader, mcap_ros2.reader, rosbags.highlevel";
+
+/// A Python with the packages, made once; `None` with a line on stderr where there is no Python or no network.
+pub fn python() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-mcap");
     let python = folder.join("bin/python");
-    let has_package = |python: &Path| {
-        Command::new(python).args(["-c", "import mcap.reader"]).output().is_ok_and(|output| output.status.success())
-    };
-    if has_package(&python) {
+    let has_packages =
+        |python: &Path| Command::new(python).args(["-c", IMPORTS]).output().is_ok_and(|output| output.status.success());
+    if has_packages(&python) {
         return Some(python);
     }
     let made = |command: &mut Command| command.output().is_ok_and(|output| output.status.success());
     let is_made = made(Command::new("python3").arg("-m").arg("venv").arg(&folder))
-        && made(Command::new(&python).args(["-m", "pip", "install", "--quiet", "mcap"]));
-    if is_made && has_package(&python) {
+        && made(Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(PACKAGES));
+    if is_made && has_packages(&python) {
         return Some(python);
     }
-    let line = "skipped: the MCAP test needs python3 with venv and pip, which can install the package mcap";
+    let line =
+        "skipped: the MCAP test needs python3 with venv and pip, which can install mcap, mcap-ros2-support and rosbags";
     assert!(std::env::var_os("TACTOMO_SKIP_NOTHING").is_none(), "{line}");
     // Past the test harness, which keeps the output of tests that pass to itself.
     drop(writeln!(std::io::stderr(), "{line}"));
     None
 }
 
-/// What Python finds in a file, `whole` or `broken`.
-fn read(python: &Path, file: &Path, state: &str) -> Vec<Value> {
-    let output = Command::new(python).args(["-c", READ]).arg(file).arg(state).output().unwrap();
+/// What a script of Python prints of files: a value in each line.
+pub fn run(python: &Path, script: &str, args: &[&Path]) -> Vec<Value> {
+    let output = Command::new(python).args(["-c", script]).args(args).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// What Python finds in a file, `whole` or `broken`.
+fn read(python: &Path, file: &Path, state: &str) -> Vec<Value> {
+    run(python, READ, &[file, Path::new(state)])
 }
 
 fn done(args: &[&str]) -> String {

@@ -24,6 +24,9 @@ use tactomo_physics::forward::ImageMesh;
 use super::feed::Delivery;
 use super::lines::Fields;
 
+/// What places of a detector that is alone are relative to.
+pub(super) const FRAME: &str = "tactomo";
+
 /// A channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
@@ -141,7 +144,7 @@ impl Messages {
 
     /// What places are relative to: the detector, with x and y from its middle.
     fn frame_id(&self) -> &str {
-        if self.patch.is_empty() { "tactomo" } else { &self.patch }
+        if self.patch.is_empty() { FRAME } else { &self.patch }
     }
 
     /// Writes the message of a channel; `false` if the event has nothing for it.
@@ -150,7 +153,7 @@ impl Messages {
     /// If memory ends, which `serde_json` cannot tell from anything else.
     pub fn write(&self, channel: Channel, delivery: &Delivery, out: &mut Vec<u8>) -> io::Result<bool> {
         let event = &*delivery.event;
-        let at = Stamp::of(event.frame.scanned().map_or(event.frame.arrived.unix_ns, |scanned| scanned.unix_ns));
+        let at = Stamp::of(event.frame.stamp_ns());
         let at = At { frame_id: self.frame_id(), stamp: at };
         match channel {
             Channel::Touch => put(&Fields::default().of(delivery), out),

@@ -92,14 +92,13 @@ impl Span {
 }
 
 impl<W: Write> Writer<W> {
-    /// Begins a file whose chunks end at a size, in bytes before they are compressed.
+    /// Begins a file of a profile, `""` if of none, whose chunks end at a size, in bytes before they are compressed.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn new(out: W, library: &str, chunk_bytes: usize) -> io::Result<Self> {
+    pub fn new(out: W, profile: &str, library: &str, chunk_bytes: usize) -> io::Result<Self> {
         let (chunk, summary) = Default::default();
         let mut writer = Self { out, written: 0, crc: CRC.digest(), chunk_bytes, chunk, summary };
-        let profile = "";
         let mut head = MAGIC.to_vec();
         put(&mut head, op::HEADER, &[&string(profile), &string(library)]);
         writer.write(&head)?;
@@ -120,13 +119,14 @@ impl<W: Write> Writer<W> {
         self.write(&record)
     }
 
-    /// Adds a channel with a schema of its own, and gives its number.
-    pub fn channel(&mut self, topic: &str, message_encoding: &str, schema: &Schema) -> u16 {
+    /// Adds a channel with metadata and a schema of its own, and gives its number.
+    pub fn channel(&mut self, topic: &str, message_encoding: &str, metadata: &[(&str, &str)], schema: &Schema) -> u16 {
         let id = self.summary.messages.len() as u16 + 1;
         self.summary.messages.insert(id, 0);
         let number = id.to_le_bytes();
         let described = [schema.name, schema.encoding, schema.data].map(string).concat();
-        let channel = [string(topic), string(message_encoding), map([])].concat();
+        let metadata = map(metadata.iter().map(|(key, value)| [string(key), string(value)].concat()));
+        let channel = [string(topic), string(message_encoding), metadata].concat();
         for records in [&mut self.chunk.records, &mut self.summary.schemas] {
             put(records, op::SCHEMA, &[&number, &described]);
         }

@@ -70,9 +70,9 @@ fn unpacked(mut chunk: Bytes) -> Vec<u8> {
 
 /// A writer of two channels; the number of a message's channel is its time modulo 2.
 fn begun(chunk_bytes: usize) -> (Writer<Vec<u8>>, [u16; 2]) {
-    let mut writer = Writer::new(Vec::new(), "tests", chunk_bytes).unwrap();
+    let mut writer = Writer::new(Vec::new(), "", "tests", chunk_bytes).unwrap();
     writer.metadata("about", &BTreeMap::from([("detector".to_owned(), "round".to_owned())])).unwrap();
-    let channels = ["/even", "/odd"].map(|topic| writer.channel(topic, "json", &SCHEMA));
+    let channels = ["/even", "/odd"].map(|topic| writer.channel(topic, "json", &[], &SCHEMA));
     (writer, channels)
 }
 
