@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Clock, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Keys, Log, MAX_WIRE, Plan,
-    Range, Request, Scope, Settings, encode_board, encode_keyed, encode_request,
+    BoardMessage, BoardReceiver, Clock, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Keys, Log, MAX_WIRE,
+    Plan, Range, Request, Scope, Settings, encode_board, encode_keyed, encode_request,
 };
 
 /// Packets in a stream at most.
