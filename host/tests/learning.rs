@@ -70,6 +70,7 @@ impl Sensor {
         let simulation = Simulation::new(&drawn(description, built), self.scene.clone(), &[], SEED).unwrap();
         let options = Options { seed: SEED, model: BoardModel::Esp32 };
         let board = SimulatedBoard::simulate(description, simulation, options).unwrap();
+        let scene_clock = board.scene_clock();
         let kept = Arc::new(Mutex::new(Vec::new()));
         let detector = self.learning.kept().unwrap().unwrap_or_else(|| description.clone());
         let solving = Solving::new(Method::Auto, Problem::of(&detector).unwrap());
@@ -96,10 +97,7 @@ impl Sensor {
             (summary, waiting.join().unwrap())
         });
         let mut answers = std::mem::take(&mut *kept.lock().unwrap());
-        // The scene begins with the first frame.
-        let [first, last] =
-            [&answers[0], &answers[answers.len() - 1]].map(|(sequence, time_s, _)| (*sequence as f64, *time_s));
-        let began_s = first.1 - first.0 * (last.1 - first.1) / (last.0 - first.0);
+        let began_s = scene_clock.began_s().expect("a frame was scanned");
         answers.iter_mut().for_each(|(_, time_s, _)| *time_s -= began_s);
         (summary, answers.split_off(before))
     }
