@@ -97,7 +97,6 @@ class Checked:
 
     def __init__(self) -> None:
         self.times: dict[str, float] = {}
-        self.host_ns: dict[str, int] = {}
         self.counts: dict[str, int] = {}
         self.touched: dict[str, int] = {}
         self.wrong: list[str] = []

@@ -25,8 +25,8 @@ const BLOCKS: usize = 64;
 const MOST_ASKED: usize = 16;
 /// A board time that is so far before the last (s) is of a board that has started anew. Frames into which 15 slow scans were folded are 6 s old.
 const BACK_S: f64 = 10.0;
-/// Halvings of an interval of rates: 2e-4 s/s becomes 2e-16.
-const HALVINGS: u32 = 40;
+/// Halvings of the interval of rates: 2e-4 s/s becomes 3e-9, which makes 0.4 us in two minutes.
+const HALVINGS: u32 = 16;
 
 /// How long before it came a frame was scanned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,11 +126,6 @@ impl BoardClock {
         Some(Delay { delay_s: ahead_s - line.ahead_at(board_s), error_s })
     }
 
-    /// By how much this machine's clock is faster than the board's (s/s), as far as is known.
-    pub fn drift(&self) -> Option<f64> {
-        self.line.map(|line| line.drift)
-    }
-
     /// Forgets everything: what comes is of a board that has started anew.
     pub fn restart(&mut self) {
         *self = Self::default();
@@ -168,14 +163,10 @@ impl BoardClock {
     /// The line that is farthest from all bounds; `None` if none keeps them.
     fn line_between(&self) -> Option<Line> {
         let from_s = self.upper.back()?.board_s;
-        let most = |drift: f64| {
-            let at = |bound: &Bound| bound.ahead_s - drift * (bound.board_s - from_s);
-            self.upper.iter().map(at).fold(f64::INFINITY, f64::min)
-        };
-        let least = |drift: f64| {
-            let at = |bound: &Bound| bound.ahead_s - drift * (bound.board_s - from_s);
-            self.lower.iter().map(at).fold(f64::NEG_INFINITY, f64::max)
-        };
+        // What a bound comes to at that time, if the clocks drift apart so.
+        let at = |drift: f64| move |bound: &Bound| bound.ahead_s - drift * (bound.board_s - from_s);
+        let most = |drift: f64| self.upper.iter().map(at(drift)).fold(f64::INFINITY, f64::min);
+        let least = |drift: f64| self.lower.iter().map(at(drift)).fold(f64::NEG_INFINITY, f64::max);
         let room = |drift: f64| most(drift) - least(drift);
         // The room is concave in the drift, as the lowest of lines less the highest of lines.
         let drift = highest([-MOST_DRIFT, MOST_DRIFT], room);
@@ -334,7 +325,7 @@ mod tests {
             let [.., [off_s, error_s]] = found[..] else { panic!("no frame") };
             // Half of 2.2 ms, and what chance adds to the quickest of two seconds.
             assert!(off_s.abs() < 1.2e-3 && error_s < 1.6e-3, "seed {seed}: {off_s} {error_s}");
-            let drift = trial.clock.drift().unwrap();
+            let drift = trial.clock.line.unwrap().drift;
             assert!((drift - trial.drift / (1.0 - trial.drift)).abs() < 1e-5, "seed {seed}: {drift} {}", trial.drift);
         }
     }

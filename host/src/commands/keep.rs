@@ -13,11 +13,12 @@ pub fn begin(file: Option<&Path>, header: &Header) -> Result<Option<Recorder>, R
 }
 
 /// Begins recordings in new files of the working directory, named by the time, as often as a page asks for one. They carry the detector as
-/// a calibration has found it, if one has.
-pub fn on_request(detector: Detector, source: String) -> BeginRecording {
+/// a calibration has found it, if one has. `patch` is the name that the detector has among several, so that none takes another's file.
+pub fn on_request(detector: Detector, source: String, patch: &str) -> BeginRecording {
+    let of = if patch.is_empty() { String::new() } else { format!("{patch}-") };
     Box::new(move |hello, calibrated| {
         let header = Header::now(calibrated.unwrap_or(&detector), source.clone());
-        let name = format!("touch-{}.tactomo", header.started_unix_s);
+        let name = format!("touch-{of}{}.tactomo", header.started_unix_s);
         Recorder::create_with_hello(Path::new(&name), &header, hello)
     })
 }

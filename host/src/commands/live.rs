@@ -2,12 +2,9 @@
 
 mod several;
 mod skin;
+mod together;
 
-use std::panic::resume_unwind;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, mpsc};
-use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
@@ -17,27 +14,21 @@ use tactomo::board::source::Source;
 use tactomo::detector::{Chosen, Detector};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
+use tactomo::run::Listener;
 use tactomo::run::calibration::Learning;
-use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
+use tactomo::run::options::{RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::{Listener, Snapshot};
 use tactomo::scene::SceneName;
-use tactomo::sink::Sinks;
 use tactomo::sink::address::Address;
 use tactomo::sink::door::{Door, Origin};
-use tactomo::sink::page::{Finger, Listen, PageSetup, Server, Shown};
-use tactomo::solve::{ContactSettings, Method, Problem};
-use tokio::sync::watch;
+use tactomo::sink::page::{Finger, Listen, Server, Shown};
+use tactomo::solve::{Method, Problem};
 
 use super::source::{self, BoardArgs};
-use super::streams::{StreamArgs, Streamed};
+use super::streams::StreamArgs;
 use super::{browser, keep};
 use tactomo_cli::choice::{DetectorArgs, Model};
 use tactomo_cli::output::message;
-use tactomo_cli::{interrupt, output};
-
-/// Requests of pages that may wait.
-const REQUESTS: usize = 64;
 
 /// What `--simulate` is here, where there may be several.
 const SIMULATE: &str = "Uses the simulated board: the real firmware on simulated pins. With a number so many of them, each with a scene of its own";
@@ -179,7 +170,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         Ok((name.clone(), show.with_context(|| format!("patch {name}"))?))
     };
     let shows = detectors.into_iter().map(of_patch).collect::<anyhow::Result<_>>()?;
-    show_all(shows, Some(&args.streams))
+    together::show_all(shows, Some(&args.streams))
 }
 
 /// What one detector is shown by.
@@ -233,97 +224,7 @@ fn kept(learning: Option<&Learning>) -> Option<Detector> {
 
 /// Serves the page of one detector, or only counts, until the end.
 pub fn show(show: Show) -> anyhow::Result<()> {
-    show_all(vec![(String::new(), show)], None)
-}
-
-/// A detector that is about to be shown.
-struct Begun {
-    /// Its name among several.
-    name: String,
-    source: Box<dyn Source>,
-    options: RunOptions,
-    ends: Ends,
-    sinks: Sinks,
-    streamed: Streamed,
-    /// Whether what it came to is told as JSON.
-    json: bool,
-}
-
-/// Serves the page of detectors, each by its name, or only counts, until the end. What ends one leaves the others as they are. `streams` have
-/// lines of all.
-fn show_all(shows: Vec<(String, Show)>, streams: Option<&StreamArgs>) -> anyhow::Result<()> {
-    let stop = interrupt::flag()?;
-    let Some((_, Show { picture, seconds, .. })) = shows.first() else { return Ok(()) };
-    let (picture, has_end) = (picture.clone(), seconds.is_some());
-    // Whatever cannot be is said before a page opens.
-    let begun = shows.into_iter().map(|(name, show)| begin(name, show, &stop)).collect::<anyhow::Result<Vec<_>>>()?;
-    let (mut begun, shown): (Vec<_>, Vec<_>) = begun.into_iter().unzip();
-    let mut of_all = Sinks::new(Arc::clone(&stop));
-    if let Some(streams) = streams {
-        streams.check(picture.json)?;
-        let detectors = begun.iter().map(|begun| begun.streamed.clone().of_patch(&begun.name)).collect();
-        of_all = streams.begin(detectors, door(&picture), Arc::clone(&stop))?;
-    }
-    let listeners = of_all.listeners(begun.iter().map(|begun| begun.name.as_str()));
-    begun.iter_mut().zip(listeners).for_each(|(begun, listener)| begun.options.listeners.extend(listener));
-    // The page may outlive the pipelines, so the snapshots have senders here too.
-    let _outlive: Vec<_> = begun.iter().map(|begun| begun.ends.snapshots.clone()).collect();
-    let server = serve(&picture, shown)?;
-    let ended: Vec<_> = thread::scope(|scope| {
-        let runs: Vec<_> = begun.into_iter().map(|begun| scope.spawn(|| one(begun, &of_all))).collect();
-        runs.into_iter().map(|run| run.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
-    });
-    let streamed = of_all.finish();
-    ended.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
-    streamed?;
-    if server.is_some() && !has_end {
-        wait(&stop);
-    }
-    Ok(())
-}
-
-/// Makes one detector ready to be shown.
-fn begin(name: String, mut show: Show, stop: &Arc<AtomicBool>) -> anyhow::Result<(Begun, Shown)> {
-    let problem = problem(&show.picture, &show.detector)?;
-    let (snapshots, newest) = watch::channel(Arc::new(Snapshot::default()));
-    let (request, requests) = mpsc::sync_channel(REQUESTS);
-    show.streams.check(show.picture.json)?;
-    let streamed = Streamed::new(&problem, &show.source.name());
-    let mut sinks = show.streams.begin(vec![streamed.clone()], door(&show.picture), Arc::clone(stop))?;
-    let setup = PageSetup {
-        detector: show.detector.clone(),
-        mesh: problem.jacobian.image_mesh.clone(),
-        usual_radius_m: ContactSettings::of(&problem).radius_m,
-        source: show.source.name(),
-        finger: show.finger,
-    };
-    let options = options(&mut show, problem, sinks.listener())?;
-    let ends = Ends { snapshots, requests, stop: Arc::clone(stop) };
-    let shown = Shown { name: name.clone(), setup, snapshots: newest, requests: request };
-    Ok((Begun { name, source: show.source, options, ends, sinks, streamed, json: show.picture.json }, shown))
-}
-
-/// Shows one detector to its end, and says what that came to, unless whoever reads what it or all write has gone: then it ends as quietly as
-/// `head` does.
-fn one(begun: Begun, of_all: &Sinks) -> anyhow::Result<()> {
-    let Begun { name, mut source, options, ends, sinks, json, .. } = begun;
-    let named = |error: anyhow::Error| if name.is_empty() { error } else { error.context(format!("patch {name}")) };
-    let summary = match tactomo::run::run(&mut *source, options, ends) {
-        Ok(summary) => summary,
-        Err(error) => {
-            let error = named(error.into());
-            if !name.is_empty() {
-                tracing::error!("{error:#}; the others go on");
-            }
-            return Err(error);
-        }
-    };
-    let is_left = sinks.reader_is_gone() || of_all.reader_is_gone();
-    let ended = sinks.finish();
-    if !is_left {
-        report(&name, &summary, json)?;
-    }
-    ended.map_err(|error| named(error.into()))
+    together::show_all(vec![(String::new(), show)], None)
 }
 
 fn problem(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Problem> {
@@ -343,7 +244,12 @@ fn method(args: &PictureArgs, problem: &Problem) -> Method {
     args.solver.or(problem.learned().map(Learned::method)).unwrap_or(Method::Auto)
 }
 
-fn options(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) -> anyhow::Result<RunOptions> {
+fn options(
+    name: &str,
+    show: &mut Show,
+    problem: Problem,
+    listener: Option<Box<dyn Listener>>,
+) -> anyhow::Result<RunOptions> {
     let detector = show.detector.clone();
     let learning = show.learning.clone();
     Ok(RunOptions {
@@ -351,7 +257,7 @@ fn options(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>
         scan: show.scan.clone(),
         solving: Some(Solving { learning, ..Solving::new(method(&show.picture, &problem), problem) }),
         recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
-        begin_recording: Some(keep::on_request(detector.clone(), show.source.name())),
+        begin_recording: Some(keep::on_request(detector.clone(), show.source.name(), name)),
         listeners: listener.into_iter().collect(),
         pointer: show.picture.pointer,
         board_log: keep::board_log(show.elf.as_deref())?,
@@ -385,34 +291,6 @@ fn serve(picture: &PictureArgs, all: Vec<Shown>) -> anyhow::Result<Option<Server
 /// Who gets in besides those who always do.
 fn door(args: &PictureArgs) -> Door {
     Door { origins: args.allow_origin.clone(), ..Door::default() }
-}
-
-/// Waits for Ctrl-C: the last picture stays on the page.
-fn wait(stop: &AtomicBool) {
-    if !stop.load(Ordering::Relaxed) {
-        message!("the page stays open until Ctrl-C");
-    }
-    while !stop.load(Ordering::Relaxed) {
-        thread::sleep(Duration::from_millis(50));
-    }
-}
-
-/// What the run of a detector came to, by the name that it has among several.
-#[derive(serde::Serialize)]
-struct NamedSummary<'a> {
-    #[serde(skip_serializing_if = "str::is_empty")]
-    patch: &'a str,
-    #[serde(flatten)]
-    summary: &'a Summary,
-}
-
-fn report(patch: &str, summary: &Summary, json: bool) -> anyhow::Result<()> {
-    if json {
-        return Ok(output::print(&serde_json::to_string(&NamedSummary { patch, summary })?)?);
-    }
-    let of = if patch.is_empty() { String::new() } else { format!("{patch}: ") };
-    message!("{of}{}", sentence(summary));
-    Ok(())
 }
 
 /// A summary in a line.

@@ -6,10 +6,8 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 
 use super::{Args, skin};
+use crate::commands::recording::folder::{EXTENSION, SKIN};
 use crate::commands::streams::StreamArgs;
-
-/// The skin of a folder of recordings.
-const SKIN: &str = "skin.toml";
 
 /// The detectors to show, each by its name, as if each were shown alone; `None` if it is one.
 ///
@@ -56,7 +54,7 @@ fn record(all: &mut [(String, Args)], folder: &Path) -> anyhow::Result<()> {
         .with_context(|| format!("cannot make the folder {} for the recordings of all", folder.display()))?;
     let mut skin = String::new();
     for (name, args) in all.iter_mut().filter(|(_, args)| args.replay.is_none()) {
-        let file = format!("{name}.tactomo");
+        let file = format!("{name}.{EXTENSION}");
         args.record.get_or_insert_with(|| folder.join(&file));
         skin += &format!("[[patch]]\nname = \"{name}\"\nreplay = \"{file}\"\n\n");
     }

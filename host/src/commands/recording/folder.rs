@@ -8,7 +8,9 @@ use anyhow::{Context, ensure};
 use tactomo::board::record::{RecordReader, edit};
 
 /// What a recording's file ends in.
-const EXTENSION: &str = "tactomo";
+pub const EXTENSION: &str = "tactomo";
+/// The file in a folder of recordings by which `live --skin` shows them together.
+pub const SKIN: &str = "skin.toml";
 
 /// The files that are meant: of folders, the recordings in them.
 pub fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
@@ -37,7 +39,7 @@ pub fn cut(folder: &Path, from_s: f64, to_s: f64, out: &Path) -> anyhow::Result<
     let pieces = files.iter().zip(starts).map(|(file, start)| {
         let later_s = (start - first).as_secs_f64();
         let to = out.join(file.file_name().unwrap_or_default());
-        edit::cut(file, (from_s - later_s).max(0.0)..=to_s - later_s, &to)?;
+        edit::cut(file, from_s - later_s..=to_s - later_s, &to)?;
         Ok(to)
     });
     pieces.collect()
@@ -65,9 +67,9 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> anyhow::Result<Vec<PathBuf>> {
 /// Makes a folder for recordings that are shown together as those of `like` are.
 fn begin(like: &Path, out: &Path) -> anyhow::Result<()> {
     fs::create_dir(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
-    let skin = like.join("skin.toml");
+    let skin = like.join(SKIN);
     if skin.is_file() {
-        let to = out.join("skin.toml");
+        let to = out.join(SKIN);
         fs::copy(&skin, &to).with_context(|| format!("cannot copy {} to {}", skin.display(), to.display()))?;
     }
     Ok(())

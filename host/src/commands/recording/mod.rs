@@ -1,6 +1,6 @@
 //! `tactomo recording`: what is in recordings, and pieces and sums of them.
 
-mod folder;
+pub mod folder;
 mod info;
 
 use std::path::{Path, PathBuf};

@@ -153,8 +153,7 @@ impl Messages {
     /// If memory ends, which `serde_json` cannot tell from anything else.
     pub fn write(&self, channel: Channel, delivery: &Delivery, out: &mut Vec<u8>) -> io::Result<bool> {
         let event = &*delivery.event;
-        let at = Stamp::of(event.frame.stamp_ns());
-        let at = At { frame_id: self.frame_id(), stamp: at };
+        let at = At { frame_id: self.frame_id(), stamp: Stamp::of(event.frame.stamp_ns()) };
         match channel {
             Channel::Touch => put(&Fields::default().of(delivery), out),
             Channel::Contacts => put(&scene::update(&event.solution, self.usual_radius_m, at), out),
