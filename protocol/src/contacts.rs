@@ -13,8 +13,8 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::coding;
 use crate::frame::{FrameHead, HEAD_BYTES};
+use crate::{CRC_BYTES, coding, wire_bytes};
 
 /// Most contacts in a packet.
 pub const MAX_CONTACTS: usize = 3;
@@ -22,6 +22,8 @@ pub const MAX_CONTACTS: usize = 3;
 pub const MAX_PIECE: usize = 64;
 /// Bytes of a contact.
 const CONTACT_BYTES: usize = 8;
+/// Longest packet of contacts on the wire (bytes).
+pub const MAX_WIRE: usize = wire_bytes(1 + HEAD_BYTES + MAX_CONTACTS * CONTACT_BYTES + CRC_BYTES);
 /// Bits of the last byte of the head that count contacts.
 const COUNT: u8 = 3;
 
