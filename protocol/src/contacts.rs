@@ -73,7 +73,7 @@ impl ContactFlags {
     pub const MISFIT: Self = Self(8);
     /// Readings are at the end of the converter's range, or contacts conduct so well that more would change nothing.
     pub const SATURATED: Self = Self(16);
-    /// Readings of the detector at rest are being taken, so no contact is looked for.
+    /// Readings of the detector at rest are not known yet, and are taken for those of a perfect detector.
     pub const RESTING: Self = Self(32);
     const NAMED: u8 = Self::MORE.0 | Self::MISFIT.0 | Self::SATURATED.0 | Self::RESTING.0;
 

@@ -133,23 +133,18 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
         }
         // It was read, and checked, when it came.
         let table = Table::read_again(store.bytes().get(..*held)?).ok()?;
-        let Some(frame) = cells.touch(&table, input, (scanned, scope, readings)) else {
-            solver.reset();
-            return Some(resting());
-        };
+        let frame = cells.touch(&table, input, (scanned, scope, readings))?;
         let answer = solver.solve_while(&table, &frame, attend).ok()?;
-        if answer.contacts().is_empty() && !answer.flags.has(Flags::MISFIT) {
-            cells.follow();
+        if cells.learn(&answer, &table) {
+            // What follows is above rest.
+            solver.reset();
         }
-        Some(told(&answer))
+        let mut contacts = told(&answer);
+        if !cells.knows_rest() {
+            contacts.flags.raise(ContactFlags::RESTING);
+        }
+        Some(contacts)
     }
-}
-
-/// No answer, as readings at rest are being taken.
-fn resting() -> Contacts {
-    let mut flags = ContactFlags::default();
-    flags.raise(ContactFlags::RESTING);
-    Contacts { head: FrameHead::default(), flags, found: Default::default() }
 }
 
 /// An answer as it is sent.

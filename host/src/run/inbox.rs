@@ -44,7 +44,7 @@ pub struct Taken {
 pub struct Found {
     /// Contacts and flags.
     pub solution: Solution,
-    /// Whether readings at rest are being taken, so that none is looked for.
+    /// Whether readings at rest are still being taken.
     pub is_taking_rest: bool,
     /// Whether the readings came too.
     pub has_readings: bool,
