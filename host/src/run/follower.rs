@@ -187,7 +187,7 @@ impl FollowLoop {
         let begun = Instant::now();
         let method = self.solvers.method();
         if let Some(found) = frame.found.clone().filter(|found| method == Method::Core || !found.has_readings) {
-            let Found { solution, is_taking_rest: is_taking_baseline, .. } = found;
+            let Found { solution, is_taking_rest: is_taking_baseline, .. } = *found;
             let first = TouchEvent::new(frame.newest, frame.mean, solution);
             self.answers.tell(TouchEvent { is_taking_baseline, ..first }, begun, frame.came);
             return Ok(());

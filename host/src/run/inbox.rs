@@ -36,7 +36,7 @@ pub struct Taken {
     /// Frames that came since the last one was taken, this one included.
     pub came: u32,
     /// What the board has found in the newest, if it finds contacts itself.
-    pub found: Option<Found>,
+    pub found: Option<Box<Found>>,
 }
 
 /// What a board has found in a frame.
@@ -53,6 +53,7 @@ pub struct Found {
 impl Taken {
     /// A frame by itself, and the rows that came in it.
     pub fn new(frame: Frame, rows: Vec<Rows>, found: Option<Found>) -> Self {
+        let found = found.map(Box::new);
         Self { mean: frame.used.clone(), newest: frame, rows, averaged: 1, came: 1, found }
     }
 }

@@ -5,7 +5,7 @@ mod qemu;
 #[path = "../../../firmware/boards/virt/src/table.rs"]
 mod table;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use anyhow::{Context, Result, ensure};
@@ -21,14 +21,25 @@ use crate::qemu::{Qemu, Request};
 /// The table several times over.
 const FRAMES: usize = 4 * table::FRAMES;
 
+/// The board's firmware as it is, and with contacts.
+struct Built {
+    plain: PathBuf,
+    contacts: PathBuf,
+}
+
 /// Builds the board once; `None` if the tools are missing and that is allowed.
-fn elf() -> Result<Option<&'static std::path::Path>> {
-    static ELF: OnceLock<std::result::Result<std::path::PathBuf, String>> = OnceLock::new();
+fn built() -> Result<Option<&'static Built>> {
+    static BUILT: OnceLock<std::result::Result<Built, String>> = OnceLock::new();
     if !qemu::available()? {
         return Ok(None);
     }
-    let built = ELF.get_or_init(|| qemu::build().map_err(|error| format!("{error:#}")));
+    let build = || Ok(Built { plain: qemu::build(None)?, contacts: qemu::build(Some("contacts"))? });
+    let built = BUILT.get_or_init(|| build().map_err(|error: anyhow::Error| format!("{error:#}")));
     Ok(Some(built.as_ref().map_err(|error| anyhow::anyhow!("{error}"))?))
+}
+
+fn elf() -> Result<Option<&'static Path>> {
+    Ok(built()?.map(|built| &*built.plain))
 }
 
 /// The frame of the table that `readings` is, at `fraction_bits` below a code.
@@ -148,7 +159,7 @@ fn a_panic_is_told_after_the_reset() -> Result<()> {
 /// Prints what contacts cost on a chip without floating-point hardware.
 #[test]
 fn contacts_cost_what_the_page_says() -> Result<()> {
-    let Some(elf) = elf()? else { return Ok(()) };
+    let Some(Built { contacts: elf, .. }) = built()? else { return Ok(()) };
     let detector = Detector::default();
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let [table, press] = ["virt.table", "virt.press"].map(|name| folder.join(name));
@@ -160,7 +171,8 @@ fn contacts_cost_what_the_page_says() -> Result<()> {
         let mut simulation = Simulation::new(&detector, scene, &[], 1)?;
         let tips = places_m[..count].iter().filter_map(|at_m| hand.tip(*at_m, 0.5, 1.0).disc());
         simulation.controls().press(tips.collect());
-        let codes = simulation.readings_v(0.0).volts().iter().flat_map(|volts| {
+        let readings = simulation.readings_v(0.0);
+        let codes = readings.volts().iter().flat_map(|volts| {
             let code = (volts / detector.adc.lsb_v()).round();
             (code as u16).to_le_bytes()
         });

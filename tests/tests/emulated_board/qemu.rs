@@ -51,21 +51,26 @@ fn has_target() -> bool {
     output.is_ok_and(|output| Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir())
 }
 
-/// Builds the firmware; returns its ELF file.
+/// Builds the firmware, with a feature or without; returns its ELF file.
 ///
 /// # Errors
 /// If it does not build.
-pub fn build() -> Result<PathBuf> {
+pub fn build(feature: Option<&str>) -> Result<PathBuf> {
     let boards = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware/boards");
     let built = Command::new(env!("CARGO"))
         .args(["build", "--release"])
+        .args(feature.iter().flat_map(|feature| ["--features", *feature]))
         .current_dir(boards.join("virt"))
         // That workspace has a target folder of its own.
         .env_remove("CARGO_TARGET_DIR")
         .status()
         .context("cargo does not start")?;
     ensure!(built.success(), "the firmware in {} does not build", boards.display());
-    Ok(boards.join("target").join(TARGET).join("release/tactomo-virt"))
+    // The next build may be one with another feature.
+    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("tactomo-virt-{}", feature.unwrap_or("plain")));
+    let elf = boards.join("target").join(TARGET).join("release/tactomo-virt");
+    std::fs::copy(&elf, &kept).with_context(|| format!("cannot copy {}", elf.display()))?;
+    Ok(kept)
 }
 
 /// The machine with the firmware in it. An instruction takes a nanosecond of its time, so that counts are the same in every
@@ -75,7 +80,7 @@ fn machine(elf: &Path, request: Request) -> Command {
     command
         .args(["-machine", "virt", "-m", "8M", "-bios", "none", "-display", "none", "-monitor", "none"])
         .args(["-icount", "shift=0,sleep=off"])
-        .args(["-device", &format!("loader,addr=0x80110000,data-len=4,data={}", request as u32)])
+        .args(["-device", &format!("loader,addr=0x80120000,data-len=4,data={}", request as u32)])
         .arg("-kernel")
         .arg(elf);
     command

@@ -20,17 +20,19 @@ const TEST_RESET: u32 = 0x7777;
 unsafe extern "C" {
     static _request: u32;
     static mut _panic_record: [u8; RECORD_BYTES];
+    #[cfg(feature = "contacts")]
     static mut _table: [u8; TABLE_BYTES];
     static _press: Press;
 }
 
 /// Room for a table (bytes), as `memory.x` has it.
+#[cfg(feature = "contacts")]
 const TABLE_BYTES: usize = 128 * 1024;
 /// Readings of a frame, a row for each ground.
 pub type Press = [[u16; ELECTRODES]; ELECTRODES];
 
 /// What whoever started the machine wants of it, set with
-/// `-device loader,addr=0x80110000,data-len=4,data=REQUEST`; an ordinary run leaves it zero.
+/// `-device loader,addr=0x80120000,data-len=4,data=REQUEST`; an ordinary run leaves it zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Run until the power goes off.
@@ -107,6 +109,7 @@ pub fn instructions() -> u64 {
 }
 
 /// The memory for a table.
+#[cfg(feature = "contacts")]
 pub fn table_memory() -> &'static mut [u8] {
     let table = &raw mut _table;
     // SAFETY: RAM that nothing else uses; called once at boot.

@@ -15,7 +15,7 @@ use core::panic::PanicInfo;
 
 use embedded_hal::delay::DelayNs;
 use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Activity, Adc, Board16, Chip, ContactFinder, Identity, Parts, RamStore, Serial, log};
+use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Parts, Serial, log};
 use tactomo_protocol::{Command, Fault, MAX_COMMAND, Output, Request as HostRequest, encode_request};
 
 use crate::detector::{AddressLine, Played, TableSampler, address_lines};
@@ -38,7 +38,14 @@ const FOLLOWED_FRAMES: u64 = 32;
 /// Frames that a measurement counts after the first: every 32nd is sent as it is.
 const MEASURED_FRAMES: u64 = 4 * 32;
 
-type Finder = ContactFinder<RamStore<&'static mut [u8]>, { table::ELECTRODES * table::ELECTRODES }>;
+/// What finds contacts: nothing, or, so that what a frame costs stays that of a board without, by a feature.
+#[cfg(not(feature = "contacts"))]
+type Finder = tactomo_firmware::NoTouch;
+#[cfg(feature = "contacts")]
+type Finder = tactomo_firmware::ContactFinder<
+    tactomo_firmware::RamStore<&'static mut [u8]>,
+    { table::ELECTRODES * table::ELECTRODES },
+>;
 type VirtBoard<'a> = Board16<Transparent<AddressLine<'a>>, TableSampler<'a>, Line, VirtChip<'a>, Finder>;
 
 defmt::timestamp!("{=u64:us}", machine::now_us());
@@ -59,7 +66,7 @@ fn main() -> ! {
         sampler: TableSampler::new(&levels, &gauge, played),
         serial: Line::new(request),
         chip: VirtChip(&gauge),
-        touch: ContactFinder::new(RamStore::new(machine::table_memory())),
+        touch: touch(),
     };
     let mut board = match VirtBoard::new(parts, IDENTITY) {
         Ok(board) => board,
@@ -70,6 +77,16 @@ fn main() -> ! {
         Request::MeasureContacts => measure_contacts(&mut board, &gauge),
         _ => serve(&mut board, request),
     }
+}
+
+#[cfg(not(feature = "contacts"))]
+fn touch() -> Finder {
+    tactomo_firmware::NoTouch
+}
+
+#[cfg(feature = "contacts")]
+fn touch() -> Finder {
+    tactomo_firmware::ContactFinder::new(tactomo_firmware::RamStore::new(machine::table_memory()))
 }
 
 /// Serves the host, as a chip would.
