@@ -45,7 +45,7 @@ impl Several {
                 finger: None,
             };
             let (requests, _) = sync_channel(1);
-            shown.push(Shown { name: (*name).to_owned(), setup, snapshots: receiver, requests });
+            shown.push(Shown { name: (*name).to_owned(), place: None, setup, snapshots: receiver, requests });
             let contacts = (0..count).map(|k| FoundContact::flat(0.008 * f64::from(k) - 0.01, 0.005, 1e-3)).collect();
             let solution = Solution { contacts, ..Solution::default() };
             let touch = answer(0, Readings::from_fn(16, |_, _| 0.0), solution);
