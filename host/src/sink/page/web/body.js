@@ -11,7 +11,7 @@ import { DepthImage, depthAt } from "./triangles.js";
 // Points along the longer side of each detector: it is small in the picture.
 const GRID = 40;
 const EDGE_PIECES = 12;
-const MOST_PIXELS = 300_000;
+const MOST_PIXELS = 420_000;
 // Shortest time between two pictures (ms), so that a processor of two cores has time for eight boards.
 const EVERY = 33;
 // Farther than this a press is no click (pixels).
@@ -23,7 +23,7 @@ const GAP = 6;
 // What is seen of a detector whose board is not there.
 const NOTHING = { contacts: [], image: null, at: () => 0 };
 // Seen from a little to the left, x to the right and y away.
-const LOOK = { turn: -0.3, tilt: 0.9 };
+const LOOK = { turn: -0.2, tilt: 0.9 };
 
 /** What the camera looks at: a body of all `points` (m). */
 function sceneOf(points) {
@@ -37,12 +37,11 @@ function sceneOf(points) {
   };
 }
 
-/** The corners of the box about a shape at rest and as it rises (m). */
+/** The corners of the box that a solid takes up, as it rises (m). */
 function cornersOf(solid) {
-  const { centre, radiusM, halfHeightM } = solid.shape;
-  const reach = radiusM * Math.SQRT1_2;
-  return [-1, 1].flatMap((x) => [-1, 1].flatMap((y) => [-1, 1].map((z) => (
-    solid.at([centre[0] + x * reach, centre[1] + y * reach, centre[2] + z * halfHeightM])))));
+  const pick = [0, 1];
+  const { boxM } = solid.shape;
+  return pick.flatMap((i) => pick.flatMap((j) => pick.map((k) => solid.at([boxM[i][0], boxM[j][1], boxM[k][2]]))));
 }
 
 /** Shows tiles whose detectors have a place. */
@@ -77,7 +76,6 @@ export class BodyView {
     this.names.replaceChildren(...this.parts.map((part) => part.label));
     this.scene = sceneOf(this.parts.flatMap((part) => cornersOf(part.solid)));
     this.card.hidden = false;
-    this.look = "";
     this.layOut();
     return true;
   }
@@ -106,6 +104,7 @@ export class BodyView {
     this.depth = new DepthImage(Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio)));
     [this.space.width, this.space.height] = [this.depth.width, this.depth.height];
     this.over = sizeCanvas(this.marks, width, height);
+    this.look = "";
     this.#ask();
   }
 
@@ -113,9 +112,9 @@ export class BodyView {
   #ask() {
     if (this.asked) return;
     this.asked = true;
-    setTimeout(() => requestAnimationFrame((now) => {
+    setTimeout(() => requestAnimationFrame(() => {
       this.asked = false;
-      this.drawnAt = now;
+      this.drawnAt = performance.now();
       this.#draw();
     }), Math.max(0, this.drawnAt + EVERY - performance.now()));
   }
@@ -193,21 +192,26 @@ export class BodyView {
     }
   }
 
-  // Names below their detectors, where no other name is.
+  // Names at the outer ends of their detectors, as seen from the middle of the body, where no other name is.
   #placeNames() {
     const at = this.camera.projection(this.scene, this.width, this.height);
+    const [cx, cy] = at(...this.scene.centre);
     const taken = [];
     for (const { solid, label } of this.parts) {
-      const corners = (solid.rimsM[0] ?? cornersOf(solid)).map((corner) => at(...corner));
-      const [xs, ys] = [0, 1].map((axis) => corners.map((corner) => corner[axis]));
+      const corners = solid.rimsM[0] ?? cornersOf(solid);
+      const sides = corners.map((corner, i) => corners[(i + 1) % corners.length].map((value, k) => (value + corner[k]) / 2));
+      const away = ([x, y]) => Math.hypot(x - cx, y - cy);
+      const [x, y] = sides.map((side) => at(...side)).reduce((a, b) => (away(b) > away(a) ? b : a));
       const { offsetWidth: width, offsetHeight: height } = label;
-      const left = Math.min(this.width - width, Math.max(0, (Math.min(...xs) + Math.max(...xs) - width) / 2));
-      let top = Math.max(...ys) + GAP;
-      const isTaken = (other) => Math.abs(other.top - top) < height && other.left < left + width && left < other.left + other.width;
-      while (taken.some(isTaken)) top += GAP;
-      top = Math.min(this.height - height, Math.max(0, top));
-      taken.push({ left, top, width });
-      label.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
+      const length = away([x, y]) || 1;
+      const [ux, uy] = [(x - cx) / length, (y - cy) / length];
+      const name = { left: x + ux * (GAP + width / 2) - width / 2, top: y + uy * (GAP + height / 2) - height / 2, width };
+      const isTaken = (other) => Math.abs(other.top - name.top) < height && other.left < name.left + width && name.left < other.left + other.width;
+      while (taken.some(isTaken)) name.top += uy < 0 ? -GAP : GAP;
+      name.left = Math.min(this.width - width, Math.max(0, name.left));
+      name.top = Math.min(this.height - height, Math.max(0, name.top));
+      taken.push(name);
+      label.style.transform = `translate(${Math.round(name.left)}px, ${Math.round(name.top)}px)`;
     }
   }
 

@@ -66,6 +66,8 @@ class Plate {
     this.sizeM = Math.max(right - left, top - bottom);
     const ends = [-THICKNESS, RISE].map((share) => share * this.sizeM);
     this.centre = [(left + right) / 2, (bottom + top) / 2, (ends[0] + ends[1]) / 2];
+    /** Corners of the box that it takes up, as it rises (m). */
+    this.boxM = [[left, bottom, ends[0]], [right, top, ends[1]]];
     this.radiusM = Math.hypot(right - left, top - bottom) / 2;
     this.halfHeightM = (ends[1] - ends[0]) / 2;
     // The longer side lies across the picture.
@@ -163,6 +165,7 @@ class Curved {
     this.centre = ends.map(([low, high]) => (low + high) / 2);
     this.sizeM = Math.max(...ends.map(([low, high]) => high - low));
     const halves = ends.map(([low, high]) => (high - low) / 2);
+    this.boxM = [-1, 1].map((sign) => this.centre.map((value, k) => value + sign * (halves[k] + SWELL * this.sizeM)));
     this.radiusM = Math.hypot(halves[0], halves[1]) + SWELL * this.sizeM;
     this.halfHeightM = halves[2] + SWELL * this.sizeM;
     this.turn = -0.6;
