@@ -274,7 +274,7 @@ mod tests {
     use tactomo_touch::solve::{Change, FoundContact, Solution};
 
     use super::*;
-    use crate::run::Frame;
+    use crate::run::{Arrival, Frame};
 
     fn block_on<T>(future: impl Future<Output = T>) -> T {
         tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(future)
@@ -365,6 +365,24 @@ mod tests {
         assert_eq!(of(&all, "thumb"), every);
         assert_eq!(of(&some, "index"), [0, 5, 10, 15, 19].map(|sequence| (sequence, 0, 0)));
         assert_eq!(of(&some, "thumb").iter().map(|(_, lost, _)| lost).sum::<u64>(), 19);
+    }
+
+    #[test]
+    fn what_does_not_change_is_told_with_the_first_and_once_a_second() {
+        let feed = Feed::default();
+        let tail = feed.taps().open("test", Keeps::All, None).unwrap();
+        let mut of = ["index", "thumb"].map(|patch| feed.of(patch));
+        drop(feed);
+        for quarter in 0..9 {
+            let event = TouchEvent::of(quarter, Solution::default());
+            let arrived = Arrival::recorded(Duration::from_millis(250 * quarter));
+            let event = Arc::new(TouchEvent { frame: Frame { arrived, ..event.frame }, ..event });
+            of.iter_mut().for_each(|feed| feed.touched(&event));
+        }
+        drop(of);
+        let told = deliveries(tail).into_iter().filter(|delivery| delivery.renews);
+        let told: Vec<_> = told.map(|delivery| delivery.event.frame.sequence).collect();
+        assert_eq!(told, [0, 0, 4, 4, 8, 8]);
     }
 
     #[test]

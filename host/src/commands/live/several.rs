@@ -5,8 +5,8 @@ use std::path::Path;
 
 use anyhow::{Context, ensure};
 
-use super::skin::{self, Patch};
 use super::Args;
+use super::skin::{self, Patch};
 use crate::commands::recording::folder::{EXTENSION, SKIN};
 use crate::commands::streams::StreamArgs;
 

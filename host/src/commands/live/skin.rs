@@ -258,7 +258,10 @@ mod tests {
             ("[[patch]]\nname = \"a/b\"", "letters, digits"),
             ("fault = [[1]]", "fault has to be a text"),
             ("simulate = true\nstream = \"-\"", "give --stream - on the command line"),
-            ("place = { xyz_m = [0, 0, 0], rpy_rad = [0, 0, 90] }", "patch thumb of skins/hand.toml: place: 90 in rpy_rad"),
+            (
+                "place = { xyz_m = [0, 0, 0], rpy_rad = [0, 0, 90] }",
+                "patch thumb of skins/hand.toml: place: 90 in rpy_rad",
+            ),
             ("place = { xyz = [0, 0, 0] }", "unknown field `xyz`"),
             ("place = { rpy_rad = [0, 0, 0] }", "missing field `xyz_m`"),
             ("place = [0, 0]", "write it as { xyz_m = [x, y, z], rpy_rad = [roll, pitch, yaw] }"),

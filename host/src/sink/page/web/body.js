@@ -23,7 +23,7 @@ const GAP = 6;
 // What is seen of a detector whose board is not there.
 const NOTHING = { contacts: [], image: null, at: () => 0 };
 // Seen from a little to the left, x to the right and y away.
-const LOOK = { turn: -0.2, tilt: 0.9 };
+const LOOK = { turn: -0.3, tilt: 0.85 };
 
 /** What the camera looks at: a body of all `points` (m). */
 function sceneOf(points) {
