@@ -340,6 +340,34 @@ fn boards_that_are_recorded_in_a_folder_are_cut_and_shown_again_as_one() {
 }
 
 #[test]
+fn places_on_a_body_stay_with_a_folder_of_recordings() {
+    let folder = Folder::new("body");
+    let [taken, piece, both, mcap] = ["taken", "piece", "both", "all.mcap"].map(|name| folder.path(name));
+    let place = "place = { xyz_m = [0.1, 0.0, -0.02], rpy_rad = [0.0, 0.5, 0.0] }";
+    let text =
+        format!("[[patch]]\nname = \"left\"\nsimulate = true\n{place}\n[[patch]]\nname = \"right\"\nsimulate = true\n");
+    let skin = folder.with("body.toml", text);
+    let runs = |args: &[&str]| {
+        let output = TACTOMO.run(args);
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    runs(&["live", "--skin", &skin, "--seconds", "0.5", "--json", "--record", &taken]);
+    runs(&["recording", "cut", &taken, "--to", "0.4", "--out", &piece]);
+    runs(&["recording", "merge", &piece, &taken, "--out", &both]);
+    runs(&["recording", "check", &both]);
+    let kept = std::fs::read_to_string(format!("{both}/skin.toml")).unwrap();
+    assert!(
+        kept.contains(&format!("replay = \"left.tactomo\"\n{place}\n")) && kept.matches("place").count() == 1,
+        "{kept}"
+    );
+    runs(&["live", "--skin", &both, "--seconds", "0.5", "--json", "--mcap", &mcap]);
+    let bytes = std::fs::read(&mcap).unwrap();
+    let has = |text: &str| bytes.windows(text.len()).any(|at| at == text.as_bytes());
+    assert!(has("/tactomo/left/tf") && has("foxglove.FrameTransform") && !has("/tactomo/right/tf"));
+    assert!(has(place.trim_start_matches("place = ")), "the file says where the detector was");
+}
+
+#[test]
 fn a_patch_that_fails_is_named_and_harms_no_other() {
     let folder = Folder::new("skin");
     let text = "[[patch]]\nname = \"lame\"\nport = \"/dev/null\"\n[[patch]]\nname = \"sound\"\nsimulate = true\n";

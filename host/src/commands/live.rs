@@ -24,8 +24,10 @@ use tactomo::scene::SceneName;
 use tactomo::sink::address::Address;
 use tactomo::sink::door::{Door, Origin};
 use tactomo::sink::page::{Finger, Listen, Server, Shown};
+use tactomo::sink::place::Place;
 use tactomo::solve::{Method, Problem};
 
+use self::skin::Patch;
 use super::source::{self, BoardArgs};
 use super::streams::StreamArgs;
 use super::{browser, keep};
@@ -146,6 +148,8 @@ pub struct PictureArgs {
 pub struct Show {
     /// Where the bytes come from.
     pub source: Box<dyn Source>,
+    /// Where the detector lies on a body, if that is told.
+    pub place: Option<Place>,
     /// What the mouse presses with, if the detector is simulated.
     pub finger: Option<Finger>,
     /// The detector that is connected.
@@ -173,11 +177,12 @@ pub struct Show {
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
     let Some(detectors) = several::detectors(&args)? else { return show(prepared(args)?) };
-    let of_patch = |(name, patch): (String, Args)| {
+    let of_patch = |Patch { name, place, args: patch }| {
         let PictureArgs { http_port, listen, allow_origin, no_open, json, .. } = args.picture.clone();
         let picture = PictureArgs { http_port, listen, allow_origin, no_open, json, ..patch.picture };
         let show = prepared(Args { picture, seconds: args.seconds, ..patch });
-        Ok((name.clone(), show.with_context(|| format!("patch {name}"))?))
+        let show = show.with_context(|| format!("patch {name}"))?;
+        Ok((name, Show { place, ..show }))
     };
     let shows = detectors.into_iter().map(of_patch).collect::<anyhow::Result<_>>()?;
     together::show_all(shows, Some(&args.streams))
@@ -206,7 +211,21 @@ fn prepared(args: Args) -> anyhow::Result<Show> {
     if output.has_contacts() {
         picture.solver.get_or_insert(Method::Core);
     }
-    Ok(Show { source, finger, settings, scan, output, learning, detector, picture, seconds, record, streams, elf })
+    Ok(Show {
+        source,
+        place: None,
+        finger,
+        settings,
+        scan,
+        output,
+        learning,
+        detector,
+        picture,
+        seconds,
+        record,
+        streams,
+        elf,
+    })
 }
 
 /// How the detector is learned, if it is.

@@ -39,6 +39,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     live::show(Show {
         detector: source::recorded_detector(&args.picture.detector, &args.file)?,
         source: source::recording(args.file, args.speed, !args.picture.json),
+        place: None,
         finger: None,
         picture: args.picture,
         scan: ScanChoice::Whole,

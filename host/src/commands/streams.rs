@@ -14,6 +14,7 @@ use tactomo::sink::channels::Messages;
 use tactomo::sink::door::Door;
 use tactomo::sink::foxglove;
 use tactomo::sink::lines::Fields;
+use tactomo::sink::place::Place;
 use tactomo::sink::target::{Form, Target};
 use tactomo::solve::{ContactSettings, Problem};
 
@@ -94,10 +95,11 @@ impl Streamed {
         Self { messages: messages(problem), about: about(problem.detector(), source) }
     }
 
-    /// The same, of one of several by this name.
-    pub fn of_patch(self, name: &str) -> Self {
-        let about = self.about.into_iter().map(|(key, value)| (format!("{name}.{key}"), value)).collect();
-        Self { messages: self.messages.of_patch(name), about }
+    /// The same, of one of several by this name, at its place on the body.
+    pub fn of_patch(self, name: &str, place: Option<Place>) -> Self {
+        let placed = place.map(|place| ("place".to_owned(), place.to_string()));
+        let about = self.about.into_iter().chain(placed).map(|(key, value)| (format!("{name}.{key}"), value)).collect();
+        Self { messages: self.messages.of_patch(name).at(place), about }
     }
 }
 

@@ -102,6 +102,8 @@ pub enum LinkState {
     /// No board is open yet.
     #[default]
     Searching,
+    /// No board is there yet, for the reason given; it is waited for.
+    Absent(String),
     /// The link is open and the board has not said Hello yet.
     Waiting,
     /// Frames come in.

@@ -67,6 +67,9 @@ pub struct RunOptions {
     pub pointer: bool,
     /// Time from Hello to the end; `None` for without end.
     pub seconds: Option<Duration>,
+    /// Whether a board that is not there at the start is waited for, as one that is lost later is. Then the time counts from the start as long as
+    /// none has said Hello.
+    pub waits: bool,
 }
 
 impl RunOptions {
@@ -86,6 +89,7 @@ impl RunOptions {
             folder: PathBuf::from("."),
             pointer: false,
             seconds: None,
+            waits: false,
         }
     }
 }

@@ -1,18 +1,18 @@
 //! The thread that receives: it reads, stamps, records, decodes and counts, and never waits for a disk, a page or a solver, but where each
 //! frame of a recording is to be answered.
 
-use std::io;
+mod links;
+
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use tactomo_board::identity;
 use tactomo_board::link::{Control, Link, Playing};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::OtherProtocol;
 use tactomo_board::sequence::Sequence;
-use tactomo_board::session::{self, GreetError, WishState};
+use tactomo_board::session::{self, GreetError};
 use tactomo_board::source::Source;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
@@ -33,12 +33,8 @@ use super::scanned::Scanned;
 use super::scanning::{PlanRequests, Planner, RequestedPlan};
 use super::{LinkState, Request};
 
-/// Time between two tries to open a link that was lost.
-const REOPEN_EVERY: Duration = Duration::from_millis(500);
-/// Bytes of one read: 40 ms at 921600 baud, 14 ms at 3 million.
-const READ_BYTES: usize = 4096;
-
-/// Runs until the time is over, the recording ends, or it is told to stop. A board that is lost is waited for.
+/// Runs until the time is over, the recording ends, or it is told to stop. A board that is lost is waited for, and one that is not there at the start
+/// if that is [wanted](RunOptions::waits).
 ///
 /// # Errors
 /// [`LiveError`] if the board cannot be used, its readings not be solved, or the recording not be kept.
@@ -75,6 +71,8 @@ pub fn run(source: &mut dyn Source, mut options: RunOptions, ends: Ends) -> Resu
         frames_lost: 0,
         board: None,
         greeted: None,
+        begun: Instant::now(),
+        missed: None,
         course: course.clone(),
         scanned,
         newest: None,
@@ -112,16 +110,6 @@ fn summary(notice: &NoticeBoard, source: String, course: &Course) -> Summary {
     }
 }
 
-/// How a connection ended.
-enum End {
-    /// Time is over, or the user has enough.
-    Stopped,
-    /// There is nothing more to come.
-    Over(String),
-    /// The link is lost and may come back.
-    Lost(String),
-}
-
 struct Reader {
     options: RunOptions,
     requests: std::sync::mpsc::Receiver<Request>,
@@ -136,6 +124,9 @@ struct Reader {
     board: Option<Board>,
     /// When the first board said Hello.
     greeted: Option<Instant>,
+    begun: Instant,
+    /// Why there is no board, while the first is waited for.
+    missed: Option<LiveError>,
     recordings: Recordings,
     course: Course,
     scanned: Scanned,
@@ -156,94 +147,6 @@ struct Board {
 }
 
 impl Reader {
-    /// Returns the name of the last link.
-    fn run(&mut self, source: &mut dyn Source) -> Result<String, LiveError> {
-        let mut link = source.open()?;
-        loop {
-            match self.serve(link.as_mut(), source.comes_back())? {
-                End::Stopped => return Ok(link.name()),
-                End::Over(reason) => {
-                    tracing::info!("{reason}");
-                    self.enter(LinkState::Ended(reason));
-                    return Ok(link.name());
-                }
-                End::Lost(reason) => {
-                    tracing::warn!("{}: {reason}; waiting for it to come back", link.name());
-                    self.enter(LinkState::Lost(reason));
-                    let name = link.name();
-                    drop(link); // A port that stays open keeps its name from the board that is plugged in again.
-                    match self.reopen(source) {
-                        Some(again) => link = again,
-                        None => return Ok(name),
-                    }
-                }
-            }
-        }
-    }
-
-    /// Opens the source again as soon as that is possible; `None` if the run ends before.
-    fn reopen(&mut self, source: &mut dyn Source) -> Option<Box<dyn Link>> {
-        while !self.is_over() {
-            match source.open() {
-                Ok(link) => return Some(link),
-                Err(error) => tracing::debug!("{}", with_causes(&error)),
-            }
-            self.answer_requests(None);
-            self.notice.keep_fresh();
-            thread::sleep(REOPEN_EVERY);
-        }
-        None
-    }
-
-    /// Talks with the board on `link` to the end.
-    fn serve(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
-        let mut connection = Connection::new(self.options.settings, comes_back);
-        self.plans.ask_again(&mut connection.session);
-        connection.session.request_output(self.options.output);
-        let mut buffer = [0; READ_BYTES];
-        self.sequence.restart();
-        self.newest = None;
-        self.enter(LinkState::Waiting);
-        while !self.is_over() {
-            self.answer_requests(Some((&mut *link, &mut connection)));
-            self.plans.ask(&mut connection.session);
-            match connection.exchange(link, &mut buffer) {
-                Ok(count) => {
-                    self.recordings.asked(connection.session.take_sent());
-                    if link.jumped() {
-                        self.sequence.restart();
-                        self.newest = None;
-                        connection.jumped();
-                        self.inbox.jump();
-                    }
-                    self.receive(&mut connection, link, &buffer[..count])?;
-                }
-                Err(error) => return lost(link, error, comes_back),
-            }
-            if connection.session.output_state() == WishState::Refused {
-                return Err(LiveError::NoContacts { link: link.name() });
-            }
-            if comes_back && let Some(error) = connection.in_vain() {
-                return self.unanswered(error, link);
-            }
-            self.show_link(link, &mut connection);
-        }
-        connection.session.leave(link);
-        let frames = self.notice.count(|meter| meter.statistics(Instant::now()).frames);
-        if comes_back && frames == 0 && self.is_timed_out() {
-            return Err(LiveError::Mute { link: link.name() });
-        }
-        Ok(End::Stopped)
-    }
-
-    /// No board has answered: at the start that is an error, later it may come back.
-    fn unanswered(&self, error: GreetError, link: &dyn Link) -> Result<End, LiveError> {
-        if self.greeted.is_some() {
-            return Ok(End::Lost(with_causes(&error)));
-        }
-        Err(LiveError::Greet { link: link.name(), error })
-    }
-
     fn receive(&mut self, connection: &mut Connection, link: &dyn Link, bytes: &[u8]) -> Result<(), LiveError> {
         let received = Instant::now();
         if bytes.is_empty() {
@@ -295,6 +198,7 @@ impl Reader {
         self.recordings.hello(&hello);
         connection.junk.get_or_insert(connection.receiver.counters().corrupt);
         self.greeted.get_or_insert(now);
+        self.missed = None;
         let known = self.board.as_ref();
         if known.is_none_or(|board| !is_same(&board.hello, &hello)) {
             let Hello { board, firmware_version, electrodes, .. } = &hello;
@@ -474,13 +378,5 @@ fn other_protocol(link: &dyn Link, found: u8) -> LiveError {
     match is_recording {
         true => LiveError::Recorded { link, other: OtherProtocol { found } },
         false => LiveError::Greet { link, error: GreetError::Version { found } },
-    }
-}
-
-fn lost(link: &dyn Link, error: io::Error, comes_back: bool) -> Result<End, LiveError> {
-    match error.kind() {
-        io::ErrorKind::UnexpectedEof => Ok(End::Over(with_causes(&error))),
-        _ if comes_back => Ok(End::Lost(with_causes(&error))),
-        _ => Err(LiveError::Link { link: link.name(), source: error }),
     }
 }

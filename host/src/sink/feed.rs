@@ -24,6 +24,8 @@ const QUEUE: usize = 4096;
 const MOST_BEHIND: usize = 512;
 /// Time without an event after which a taker is told that nothing comes.
 const QUIET: Duration = Duration::from_millis(100);
+/// Time after which a taker is told again what does not change (ns), such as a place: who begins to look in the middle waits no longer.
+const RENEWED_EVERY_NS: u64 = 1_000_000_000;
 
 /// An event of a detector by the name that it has among others; an empty one if it is alone.
 type Named = (Arc<str>, Arc<TouchEvent>);
@@ -67,6 +69,8 @@ struct Course {
     /// Frames lost by the link or the board until the event that was delivered last, if one was.
     lost: Option<u64>,
     changes: Changes,
+    /// When what does not change was told (ns since 1970), if it was.
+    renewed_ns: Option<u64>,
 }
 
 /// What a taker has lost, since it was too slow.
@@ -93,6 +97,8 @@ pub struct Delivery {
     pub pointer_events: Vec<PointerEvent>,
     /// The contacts, with what they have done since the delivery before.
     pub changed: Changed,
+    /// Whether what does not change is to be told: it is with the first, and again once a second.
+    pub renews: bool,
 }
 
 impl Delivery {
@@ -100,7 +106,8 @@ impl Delivery {
     pub fn at_once(event: TouchEvent, changes: &mut Changes) -> Self {
         let (lost_before, pointer_events) = (event.lost_before, event.pointer_events.clone());
         let changed = changes.take(&event.solution.contacts);
-        Self { patch: Arc::default(), event: Arc::new(event), lost_before, missed_before: 0, pointer_events, changed }
+        let (patch, event) = (Arc::default(), Arc::new(event));
+        Self { patch, event, lost_before, missed_before: 0, pointer_events, changed, renews: true }
     }
 }
 
@@ -183,7 +190,8 @@ impl Tail {
     }
 
     fn course(&mut self, patch: &Arc<str>) -> &mut Course {
-        let begun = || Course { decimator: Decimator::new(self.most_per_s), lost: None, changes: Changes::default() };
+        let decimator = || Decimator::new(self.most_per_s);
+        let begun = || Course { decimator: decimator(), lost: None, changes: Changes::default(), renewed_ns: None };
         self.patches.entry(Arc::clone(patch)).or_insert_with(begun)
     }
 
@@ -233,8 +241,13 @@ impl Tail {
         let before = course.lost.replace(lost).unwrap_or(lost.saturating_sub(event.lost_before));
         let lost_before = lost.saturating_sub(before);
         let changed = course.changes.take(&event.solution.contacts);
+        let now_ns = event.frame.arrived.unix_ns;
+        let renews = course.renewed_ns.is_none_or(|then_ns| now_ns.abs_diff(then_ns) >= RENEWED_EVERY_NS);
+        if renews {
+            course.renewed_ns = Some(now_ns);
+        }
         let missed_before = std::mem::take(&mut self.losses.before);
-        Delivery { patch, event, lost_before, missed_before, pointer_events, changed }
+        Delivery { patch, event, lost_before, missed_before, pointer_events, changed, renews }
     }
 }
 
@@ -261,7 +274,7 @@ mod tests {
     use tactomo_touch::solve::{Change, FoundContact, Solution};
 
     use super::*;
-    use crate::run::Frame;
+    use crate::run::{Arrival, Frame};
 
     fn block_on<T>(future: impl Future<Output = T>) -> T {
         tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(future)
@@ -352,6 +365,24 @@ mod tests {
         assert_eq!(of(&all, "thumb"), every);
         assert_eq!(of(&some, "index"), [0, 5, 10, 15, 19].map(|sequence| (sequence, 0, 0)));
         assert_eq!(of(&some, "thumb").iter().map(|(_, lost, _)| lost).sum::<u64>(), 19);
+    }
+
+    #[test]
+    fn what_does_not_change_is_told_with_the_first_and_once_a_second() {
+        let feed = Feed::default();
+        let tail = feed.taps().open("test", Keeps::All, None).unwrap();
+        let mut of = ["index", "thumb"].map(|patch| feed.of(patch));
+        drop(feed);
+        for quarter in 0..9 {
+            let event = TouchEvent::of(quarter, Solution::default());
+            let arrived = Arrival::recorded(Duration::from_millis(250 * quarter));
+            let event = Arc::new(TouchEvent { frame: Frame { arrived, ..event.frame }, ..event });
+            of.iter_mut().for_each(|feed| feed.touched(&event));
+        }
+        drop(of);
+        let told = deliveries(tail).into_iter().filter(|delivery| delivery.renews);
+        let told: Vec<_> = told.map(|delivery| delivery.event.frame.sequence).collect();
+        assert_eq!(told, [0, 0, 4, 4, 8, 8]);
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub mod foxglove;
 pub mod lines;
 pub mod mcap;
 pub mod page;
+pub mod place;
 mod running;
 pub mod stream;
 pub mod target;

@@ -45,13 +45,19 @@ fn data(socket: &mut Socket, now_ns: &mut u64) -> (u32, u64, Value) {
                 *now_ns = u64::from_le_bytes(bytes[1..].try_into().unwrap());
                 continue;
             }
-            assert_eq!(bytes[0], 1, "message data");
-            let subscription = u32::from_le_bytes(bytes[1..5].try_into().unwrap());
-            let log_time_ns = u64::from_le_bytes(bytes[5..13].try_into().unwrap());
+            let (subscription, log_time_ns, message) = datum(&bytes);
             assert!((*now_ns..*now_ns + 20_000_000).contains(&log_time_ns), "{now_ns} {log_time_ns}");
-            return (subscription, log_time_ns, serde_json::from_slice(&bytes[13..]).unwrap());
+            return (subscription, log_time_ns, message);
         }
     }
+}
+
+/// Subscription, log time (ns) and data of a message.
+fn datum(bytes: &[u8]) -> (u32, u64, Value) {
+    assert_eq!(bytes[0], 1, "message data");
+    let subscription = u32::from_le_bytes(bytes[1..5].try_into().unwrap());
+    let log_time_ns = u64::from_le_bytes(bytes[5..13].try_into().unwrap());
+    (subscription, log_time_ns, serde_json::from_slice(&bytes[13..]).unwrap())
 }
 
 fn say(socket: &mut Socket, message: &Value) {
@@ -109,6 +115,39 @@ fn an_app_sees_the_channels_and_gets_those_that_it_subscribes_to() {
     say(&mut socket, &json!({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 99}]}));
     let status = json(&mut socket);
     assert!(status["op"] == "status" && status["message"].as_str().unwrap().contains("99"), "{status}");
+    live.child.kill().unwrap();
+    live.end();
+}
+
+#[test]
+fn an_app_is_told_once_a_second_where_detectors_are_on_a_body() {
+    let skin = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml");
+    let mut live = Live::of(&["--skin", skin, "--json", "--foxglove", "0", "--seconds", "60"]);
+    let (mut socket, _) = connect(&live.told("open ws://"), "foxglove.websocket.v1").unwrap();
+    let _info = json(&mut socket);
+    let advertised = json(&mut socket);
+    let is_transform = |channel: &&Value| channel["schemaName"] == "foxglove.FrameTransform";
+    let channels: Vec<_> = advertised["channels"].as_array().unwrap().iter().filter(is_transform).collect();
+    let topics: Vec<_> = channels.iter().map(|channel| channel["topic"].as_str().unwrap()).collect();
+    let fingers = ["thumb", "index", "middle", "ring", "little"];
+    assert_eq!(topics, fingers.map(|finger| format!("/tactomo/{finger}/tf")));
+    let subscriptions: Vec<_> =
+        channels.iter().zip(0..).map(|(c, id)| json!({"id": id, "channelId": c["id"]})).collect();
+    say(&mut socket, &json!({"op": "subscribe", "subscriptions": subscriptions}));
+    let (mut times_ns, mut count) = ([0; 5], 0);
+    while count < 15 {
+        let Message::Binary(bytes) = socket.read().unwrap() else { continue };
+        // The time is told too.
+        if bytes[0] != 1 {
+            continue;
+        }
+        let (finger, log_time_ns, transform) = datum(&bytes);
+        let finger = finger as usize;
+        assert_eq!([&transform["parent_frame_id"], &transform["child_frame_id"]], ["body", fingers[finger]]);
+        let before_ns = std::mem::replace(&mut times_ns[finger], log_time_ns);
+        assert!(log_time_ns - before_ns >= 1_000_000_000, "{before_ns} {log_time_ns}");
+        count += 1;
+    }
     live.child.kill().unwrap();
     live.end();
 }

@@ -26,9 +26,14 @@ pub fn path(name: &str) -> PathBuf {
 }
 
 impl Live {
-    /// Starts it without a page.
+    /// Starts it on a simulated board.
     pub fn start(args: &[&str]) -> Self {
-        let all = [&["live", "--simulate", "--scene", "wandering", "--no-open"], args].concat();
+        Self::of(&[&["--simulate", "--scene", "wandering"], args].concat())
+    }
+
+    /// Starts it without a page that opens.
+    pub fn of(args: &[&str]) -> Self {
+        let all = [&["live", "--no-open"], args].concat();
         let mut child = tactomo(&all).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let stderr = BufReader::new(child.stderr.take().unwrap());
         Self { child, stderr, said: String::new() }

@@ -343,7 +343,7 @@ fn several_detectors_have_a_page_and_a_socket_each_and_one_with_all() -> Result<
     let (_snapshots, receiver) = watch::channel(Arc::default());
     let of = |name: &str, requests| -> Result<Shown> {
         let setup = PageSetup { source: format!("the board of {name}"), ..setup(Some(FINGER))? };
-        Ok(Shown { name: name.to_owned(), setup, snapshots: receiver.clone(), requests })
+        Ok(Shown { name: name.to_owned(), place: None, setup, snapshots: receiver.clone(), requests })
     };
     let [(thumb, of_thumb), (palm, of_palm)] = [sync_channel(4), sync_channel(4)];
     let server = Server::start(local(Some(0)), vec![of("thumb", thumb)?, of("palm", palm)?])?;

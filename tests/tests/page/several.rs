@@ -11,6 +11,7 @@ use tactomo::detector::Detector;
 use tactomo::readings::Readings;
 use tactomo::run::{LinkState, Snapshot};
 use tactomo::sink::page::{Listen, PageSetup, Server, Shown};
+use tactomo::sink::place::Place;
 use tactomo::solve::{FoundContact, Solution};
 use tokio::sync::watch;
 
@@ -28,10 +29,15 @@ struct Several {
 
 impl Several {
     fn start(names: &[&str]) -> Result<Self> {
-        Self::at(0, names)
+        Self::at(0, names, |_| None)
     }
 
-    fn at(port: u16, names: &[&str]) -> Result<Self> {
+    /// On a body, side by side along x, each turned a little more about y.
+    fn on_a_body(names: &[&str]) -> Result<Self> {
+        Self::at(0, names, |k| Some(Place { xyz_m: [0.08 * k, 0.0, 0.0], rpy_rad: [0.0, 0.3 * k, 0.0] }))
+    }
+
+    fn at(port: u16, names: &[&str], place: impl Fn(f64) -> Option<Place>) -> Result<Self> {
         let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
         let stop = Arc::<AtomicBool>::default();
         let (mut shown, mut snapshots, mut publishers) = (Vec::new(), Vec::new(), Vec::new());
@@ -45,7 +51,13 @@ impl Several {
                 finger: None,
             };
             let (requests, _) = sync_channel(1);
-            shown.push(Shown { name: (*name).to_owned(), setup, snapshots: receiver, requests });
+            shown.push(Shown {
+                name: (*name).to_owned(),
+                place: place(f64::from(count)),
+                setup,
+                snapshots: receiver,
+                requests,
+            });
             let contacts = (0..count).map(|k| FoundContact::flat(0.008 * f64::from(k) - 0.01, 0.005, 1e-3)).collect();
             let solution = Solution { contacts, ..Solution::default() };
             let touch = answer(0, Readings::from_fn(16, |_, _| 0.0), solution);
@@ -110,12 +122,95 @@ fn a_tile_tells_of_its_own_detector_and_opens_its_page() -> Result<()> {
 }
 
 #[test]
-fn axe_finds_nothing_on_the_tiles() -> Result<()> {
+fn the_body_is_shown_where_there_are_places_alone() -> Result<()> {
+    let is_hidden = "return document.getElementById('body').hidden";
+    opened(
+        || Several::start(&["thumb", "index"]),
+        async |stage| {
+            stage.browser.shows(TILES, |told| told.as_array().is_some_and(|tiles| tiles.len() == 2)).await?;
+            stage.browser.shows(is_hidden, |told| *told == true).await?;
+            Ok(())
+        },
+    )?;
+    opened(
+        || Several::on_a_body(&["thumb", "index"]),
+        async |stage| {
+            stage.browser.shows(is_hidden, |told| *told == false).await?;
+            // Two contacts, and one of the other, are seen in colours of their own.
+            stage.browser.shows(BODY, |told| told.as_i64().is_some_and(|colours| colours > 20)).await?;
+            stage.behind.snapshots[1].lock().expect("no test panics with it").link =
+                LinkState::Absent("no port".to_owned());
+            let names = "return [...document.querySelectorAll('#body-names a')].map((name) => [name.textContent, name.className])";
+            let told_names = json!([["index", "stale"], ["thumb", "touched"]]);
+            stage.browser.shows(names, |told| *told == told_names).await?;
+            let tile = json!(["index", "Waiting for the board: no port", "index/"]);
+            stage.browser.shows(TILES, |told| told[1] == tile).await?;
+            Ok(())
+        },
+    )
+}
+
+/// How many colours the body is drawn in.
+const BODY: &str = "const canvas = document.getElementById('body-space');
+    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    return new Set(new Uint32Array(data.buffer)).size";
+/// Presses the mouse at the leftmost pixel of the body, or moves it by so many pixels from there if that is not 0, and lets go.
+const MOUSE: &str = "const canvas = document.getElementById('body-space'), plot = document.getElementById('body-plot');
+    const { data, width } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    const box = plot.getBoundingClientRect(), ratio = box.width / width;
+    let found = [Infinity, 0];
+    for (let i = 3; i < data.length; i += 4) {
+        const pixel = (i - 3) / 4;
+        if (data[i] > 0 && pixel % width < found[0]) found = [pixel % width, Math.floor(pixel / width)];
+    }
+    const [x, y] = [box.left + (found[0] + 2) * ratio, box.top + (found[1] + 0.5) * ratio];
+    const send = (kind, by) => plot.dispatchEvent(new PointerEvent(kind, { clientX: x + by, clientY: y, pointerId: 1, buttons: 1, bubbles: true }));
+    plot.setPointerCapture = () => {};
+    send('pointerdown', 0);
+    if (BY) send('pointermove', BY);
+    send('pointerup', BY);
+    send('click', BY);
+    return true";
+
+#[test]
+fn the_body_is_turned_by_mouse_and_keyboard_and_a_click_opens_a_detector() -> Result<()> {
+    opened(
+        || Several::on_a_body(&["thumb", "index"]),
+        async |stage| {
+            stage.browser.shows(BODY, |told| told.as_i64().is_some_and(|colours| colours > 20)).await?;
+            let looks = "return [...document.querySelectorAll('#body-names a')].map((name) => name.style.transform)";
+            let mut before = stage.browser.run(looks).await?;
+            let first = before.clone();
+            let key = |key: &str| {
+                format!(
+                    "const plot = document.getElementById('body-plot');
+                    plot.focus();
+                    document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', bubbles: true }}))"
+                )
+            };
+            for turn in [key("ArrowLeft"), key("ArrowUp"), key("+"), MOUSE.replace("BY", "40")] {
+                stage.browser.run(&turn).await?;
+                stage.browser.shows(looks, |told| *told != before).await?;
+                before = stage.browser.run(looks).await?;
+            }
+            stage.browser.run(&key("0")).await?;
+            stage.browser.shows(looks, |told| *told == first).await?;
+            stage.browser.run(&MOUSE.replace("BY", "0")).await?;
+            let is_thumb = |title: &serde_json::Value| title.as_str().is_some_and(|title| title.contains("thumb"));
+            stage.browser.shows("return document.title", is_thumb).await?;
+            Ok(())
+        },
+    )
+}
+
+#[test]
+fn axe_finds_nothing_on_the_tiles_and_the_body() -> Result<()> {
     let Some(axe) = axe()? else { return Ok(()) };
     opened(
-        || Several::start(&["thumb", "index", "middle"]),
+        || Several::on_a_body(&["thumb", "index", "middle"]),
         async |stage| {
             stage.browser.shows(TILES, |told| told.as_array().is_some_and(|tiles| tiles.len() == 3)).await?;
+            stage.browser.shows(BODY, |told| told.as_i64().is_some_and(|colours| colours > 20)).await?;
             let mut all = Vec::new();
             for theme in ["light", "dark"] {
                 stage.browser.run(&format!("document.documentElement.dataset.theme = '{theme}'")).await?;
@@ -139,7 +234,7 @@ fn tiles_are_those_of_whichever_program_has_the_address() -> Result<()> {
                 let mut first = stage.behind.0.lock().expect("no test panics with it");
                 first.take().context("the first program")?.server.port()
             };
-            let _others = Several::at(port, &["palm", "wrist"])?;
+            let _others = Several::at(port, &["palm", "wrist"], |_| None)?;
             let tiles = json!([["palm", "1 contact", "palm/"], ["wrist", "2 contacts", "wrist/"]]);
             stage.browser.shows(TILES, |told| *told == tiles).await?;
             Ok(())

@@ -26,10 +26,15 @@ pub struct Host {
 
 impl Host {
     pub fn start(port: &Path) -> Self {
+        Self::with(port, |options| options)
+    }
+
+    /// With what `change` makes of the usual options.
+    pub fn with(port: &Path, change: impl FnOnce(RunOptions) -> RunOptions) -> Self {
         let (snapshot, snapshots) = watch::channel(Arc::default());
         let (_requests, requests) = mpsc::channel();
         let stop = Arc::new(AtomicBool::new(false));
-        let options = RunOptions::new(Detector::preset("square-60").unwrap());
+        let options = change(RunOptions::new(Detector::preset("square-60").unwrap()));
         let ends = Ends { snapshots: snapshot, requests, stop: Arc::clone(&stop) };
         let mut source = NamedPort { port: port.to_str().unwrap().to_owned(), baud: DEFAULT_BAUD };
         let thread = thread::spawn(move || tactomo::run::run(&mut source, options, ends));

@@ -14,7 +14,8 @@ use host::Host;
 use serialport::SerialPort;
 use tactomo::board::link::serial::{DEFAULT_BAUD, SerialLink};
 use tactomo::board::session::greet;
-use tactomo::run::LinkState;
+use tactomo::run::options::RunOptions;
+use tactomo::run::{LinkState, Snapshot};
 use tactomo_protocol::{BoardMessage, Command, Fault};
 
 /// What a chip's boot loader says.
@@ -142,6 +143,57 @@ fn a_board_that_is_unplugged_is_taken_up_again_when_it_comes_back() {
     host.wait_until("frames come in again", |snapshot| snapshot.link == LinkState::Streaming);
     let summary = host.finish().unwrap();
     assert_eq!((summary.frames, summary.dropped, summary.corrupt), (20, 0, 0));
+}
+
+/// One of several, whose board is waited for.
+fn waiting(options: RunOptions) -> RunOptions {
+    RunOptions { waits: true, ..options }
+}
+
+/// Whether a board is waited for, for a reason with such words in it.
+fn is_absent(snapshot: &Snapshot, words: &str) -> bool {
+    matches!(&snapshot.link, LinkState::Absent(reason) if reason.contains(words))
+}
+
+#[test]
+fn a_board_that_is_not_there_at_the_start_is_waited_for_where_it_is_one_of_several() {
+    let mut board = Board::plug("late");
+    board.unplug();
+    let port = board.port().display().to_string();
+    let host = Host::with(board.port(), waiting);
+    host.wait_until("the port is missed", |snapshot| is_absent(snapshot, &format!("there is no serial port {port}")));
+    let mut board = Board::plug("late");
+    board.greet();
+    board.frames(10);
+    host.wait_for_frames(10);
+    host.wait_until("frames come in", |snapshot| snapshot.link == LinkState::Streaming);
+    let summary = host.finish().unwrap();
+    assert_eq!((summary.frames, summary.dropped, summary.source), (10, 0, port));
+}
+
+#[test]
+fn a_board_that_does_not_answer_at_the_start_is_asked_again_where_it_is_one_of_several() {
+    let mut board = Board::plug("mute");
+    let host = Host::with(board.port(), waiting);
+    host.wait_until("the silence is told", |snapshot| is_absent(snapshot, "no board said Hello"));
+    board.greet();
+    board.frames(10);
+    host.wait_for_frames(10);
+    assert_eq!(host.finish().unwrap().frames, 10);
+}
+
+#[test]
+fn a_board_that_does_not_come_in_time_is_an_error_at_the_end() {
+    let mut board = Board::plug("never");
+    board.unplug();
+    let limit = Duration::from_millis(700);
+    let host = Host::with(board.port(), |options| RunOptions { seconds: Some(limit), ..waiting(options) });
+    let begin = Instant::now();
+    let error = host.ended().unwrap_err().to_string();
+    assert!(begin.elapsed() >= limit && error.contains(board.port().to_str().unwrap()), "{error}");
+    let host = Host::with(board.port(), waiting);
+    assert_eq!(host.finish().unwrap().frames, 0, "who ends it by hand knows");
+    assert!(Host::start(board.port()).ended().is_err(), "alone it is an error at once");
 }
 
 #[test]

@@ -266,7 +266,7 @@ impl Live {
             Some(LinkState::Searching) => "searching".to_owned(),
             Some(LinkState::Waiting) => "waiting".to_owned(),
             Some(LinkState::Streaming) => "streaming".to_owned(),
-            Some(LinkState::Silent(why) | LinkState::Lost(why) | LinkState::Ended(why)) => why,
+            Some(LinkState::Silent(why) | LinkState::Absent(why) | LinkState::Lost(why) | LinkState::Ended(why)) => why,
         }
     }
 

@@ -5,15 +5,16 @@ use std::path::Path;
 
 use anyhow::{Context, ensure};
 
-use super::{Args, skin};
+use super::Args;
+use super::skin::{self, Patch};
 use crate::commands::recording::folder::{EXTENSION, SKIN};
 use crate::commands::streams::StreamArgs;
 
-/// The detectors to show, each by its name, as if each were shown alone; `None` if it is one.
+/// The detectors to show; `None` if it is one.
 ///
 /// # Errors
 /// If the skin is none, or they cannot be recorded.
-pub fn detectors(args: &Args) -> anyhow::Result<Option<Vec<(String, Args)>>> {
+pub fn detectors(args: &Args) -> anyhow::Result<Option<Vec<Patch>>> {
     let mut all = match &args.skin {
         Some(path) => skin::read(&if path.is_dir() { path.join(SKIN) } else { path.clone() })?,
         None if args.board.boards() > 1 => boards(args)?,
@@ -26,37 +27,38 @@ pub fn detectors(args: &Args) -> anyhow::Result<Option<Vec<(String, Args)>>> {
 }
 
 /// Boards on ports, or simulated: each is asked for what the command line asks of all, and has a scene of its own.
-fn boards(args: &Args) -> anyhow::Result<Vec<(String, Args)>> {
+fn boards(args: &Args) -> anyhow::Result<Vec<Patch>> {
     let of_one = || Args { streams: StreamArgs::default(), record: None, ..args.clone() };
     let simulated = |k: u8| {
         let mut board = of_one();
         board.board.simulate = Some(1);
         board.board.scene = board.board.scene.later(u64::from(k));
-        (format!("board-{}", k + 1), board)
+        Patch { name: format!("board-{}", k + 1), place: None, args: board }
     };
     let on_port = |port: &String| {
         let mut board = of_one();
         board.board.ports = vec![port.clone()];
-        (name_of(port), board)
+        Patch { name: name_of(port), place: None, args: board }
     };
     let ports = args.board.ports.iter().map(on_port);
     let all: Vec<_> = (0..args.board.simulate.unwrap_or(0)).map(simulated).chain(ports).collect();
-    for (i, (name, _)) in all.iter().enumerate() {
-        let is_new = all[..i].iter().all(|(other, _)| other != name);
+    for (i, Patch { name, .. }) in all.iter().enumerate() {
+        let is_new = all[..i].iter().all(|other| other.name != *name);
         ensure!(is_new, "two boards would be called {name}: name each port once, or give them names with --skin");
     }
     Ok(all)
 }
 
 /// Has each of them recorded in a folder, which can be shown again as it is.
-fn record(all: &mut [(String, Args)], folder: &Path) -> anyhow::Result<()> {
+fn record(all: &mut [Patch], folder: &Path) -> anyhow::Result<()> {
     fs::create_dir(folder)
         .with_context(|| format!("cannot make the folder {} for the recordings of all", folder.display()))?;
     let mut skin = String::new();
-    for (name, args) in all.iter_mut().filter(|(_, args)| args.replay.is_none()) {
+    for Patch { name, place, args } in all.iter_mut().filter(|patch| patch.args.replay.is_none()) {
         let file = format!("{name}.{EXTENSION}");
         args.record.get_or_insert_with(|| folder.join(&file));
-        skin += &format!("[[patch]]\nname = \"{name}\"\nreplay = \"{file}\"\n\n");
+        let place = place.map_or_else(String::new, |place| format!("place = {place}\n"));
+        skin += &format!("[[patch]]\nname = \"{name}\"\nreplay = \"{file}\"\n{place}\n");
     }
     let path = folder.join(SKIN);
     fs::write(&path, skin).with_context(|| format!("cannot write {}", path.display()))

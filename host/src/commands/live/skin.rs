@@ -1,12 +1,13 @@
 //! A skin: several detectors, each with its board, shown together.
 //!
-//! A skin's file has a table `[[patch]]` for each detector: its `name`, and whatever options of `tactomo live` belong to one board, by their
-//! names. So what a patch may be asked for is what the command may be, and is checked by the same rules.
+//! A skin's file has a table `[[patch]]` for each detector: its `name`, its `place` on the body if it has one, and whatever options of `tactomo live`
+//! belong to one board, by their names. So what a patch may be asked for is what the command may be, and is checked by the same rules.
 
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use tactomo::causes::with_causes;
+use tactomo::sink::place::Place;
 
 use super::Args;
 
@@ -72,17 +73,28 @@ pub enum SkinError {
     },
 }
 
+/// One of several detectors.
+pub struct Patch {
+    /// What it is called.
+    pub name: String,
+    /// Where it lies on the body, if that is told.
+    pub place: Option<Place>,
+    /// What it would be shown by if it were alone.
+    pub args: Args,
+}
+
 /// A skin's file.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    patch: Vec<Patch>,
+    patch: Vec<Table>,
 }
 
 /// A patch in it.
 #[derive(serde::Deserialize)]
-struct Patch {
+struct Table {
     name: String,
+    place: Option<toml::Value>,
     #[serde(flatten)]
     options: toml::Table,
 }
@@ -95,39 +107,48 @@ struct Options {
     args: Args,
 }
 
-/// The detectors of a skin, each by its name, as if each were shown alone.
+/// The detectors of a skin.
 ///
 /// # Errors
 /// [`SkinError`] if the file is no skin, or a patch asks for what cannot be.
-pub fn read(path: &Path) -> Result<Vec<(String, Args)>, SkinError> {
+pub fn read(path: &Path) -> Result<Vec<Patch>, SkinError> {
     let text = std::fs::read_to_string(path).map_err(|source| SkinError::Read { path: path.to_owned(), source })?;
     of_text(&text, path)
 }
 
-fn of_text(text: &str, path: &Path) -> Result<Vec<(String, Args)>, SkinError> {
+fn of_text(text: &str, path: &Path) -> Result<Vec<Patch>, SkinError> {
     let no_skin = |what: String| SkinError::Skin { path: path.to_owned(), what };
     let File { patch: patches } = toml::from_str(text).map_err(|error| no_skin(with_causes(&error)))?;
     if patches.is_empty() {
         return Err(no_skin("it has no [[patch]]".to_owned()));
     }
-    let mut read: Vec<(String, Args)> = Vec::with_capacity(patches.len());
-    for Patch { name, options } in patches {
+    let mut read: Vec<Patch> = Vec::with_capacity(patches.len());
+    for Table { name, place, options } in patches {
         let wrong = |what| SkinError::Patch { path: path.to_owned(), patch: name.clone(), what };
         let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || !name.chars().all(is_name) {
             return Err(wrong("a name is of letters, digits, - and _, as it is part of an address".to_owned()));
         }
-        if read.iter().any(|(other, _)| *other == name) {
+        if read.iter().any(|other| other.name == name) {
             return Err(wrong("another patch has this name: give each its own".to_owned()));
         }
+        let place = place.map(placed).transpose().map_err(wrong)?;
         let words = words(&options, path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;
         let parsed = Options::try_parse_from(words).map_err(|error| wrong(said(&error)))?;
         if parsed.args.streams.use_stdout() {
             return Err(wrong("stdout is of all: give --stream - on the command line".to_owned()));
         }
-        read.push((name, parsed.args));
+        read.push(Patch { name, place, args: parsed.args });
     }
     Ok(read)
+}
+
+/// A place, as it is written.
+fn placed(place: toml::Value) -> Result<Place, String> {
+    let form = "write it as { xyz_m = [x, y, z], rpy_rad = [roll, pitch, yaw] }";
+    let place: Place = place.try_into().map_err(|error| format!("place: {}; {form}", with_causes(&error).trim()))?;
+    place.check().map_err(|error| format!("place: {error}"))?;
+    Ok(place)
 }
 
 /// Options as words of a command line.
@@ -177,7 +198,7 @@ fn said(error: &clap::Error) -> String {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Vec<(String, Args)>, String> {
+    fn read(text: &str) -> Result<Vec<Patch>, String> {
         of_text(text, Path::new("skins/hand.toml")).map_err(|error| error.to_string())
     }
 
@@ -186,12 +207,24 @@ mod tests {
         let text = "[[patch]]\nname = \"thumb\"\nsimulate = true\nboard = \"ideal\"\nforce = 0.5\nfault = [\"open:3\"]\n\
                     [[patch]]\nname = \"palm\"\nport = \"/dev/ttyUSB1\"\nmax_fps = 100\ndetector = \"palm.toml\"\nno_learning = false\n";
         let patches = read(text).unwrap();
-        let [(thumb, of_thumb), (palm, of_palm)] = &patches[..] else { panic!("two patches") };
+        let [Patch { name: thumb, args: of_thumb, .. }, Patch { name: palm, args: of_palm, .. }] = &patches[..] else {
+            panic!("two patches")
+        };
         assert_eq!([thumb, palm], ["thumb", "palm"]);
         assert!(of_thumb.board.is_simulated() && of_thumb.board.scene.fault.len() == 1 && !of_palm.picture.no_learning);
         assert_eq!(of_palm.board.ports, ["/dev/ttyUSB1"]);
         let chosen = of_palm.picture.detector.detector.as_ref().map(|chosen| format!("{chosen:?}"));
         assert!(chosen.is_some_and(|chosen| chosen.contains("skins/palm.toml")));
+    }
+
+    #[test]
+    fn a_patch_may_have_a_place_on_the_body() {
+        let text = "[[patch]]\nname = \"thumb\"\nsimulate = true\nplace = { xyz_m = [0.1, 0, -0.02], rpy_rad = [0, 0.5, 0] }\n\
+                    [[patch]]\nname = \"index\"\nsimulate = true\n[patch.place]\nxyz_m = [0, 0, 1]\n\
+                    [[patch]]\nname = \"palm\"\nsimulate = true\n";
+        let places: Vec<_> = read(text).unwrap().into_iter().map(|patch| patch.place).collect();
+        let place = |xyz_m, rpy_rad| Some(Place { xyz_m, rpy_rad });
+        assert_eq!(places, [place([0.1, 0.0, -0.02], [0.0, 0.5, 0.0]), place([0.0, 0.0, 1.0], [0.0; 3]), None]);
     }
 
     #[test]
@@ -226,6 +259,13 @@ mod tests {
             ("[[patch]]\nname = \"a/b\"", "letters, digits"),
             ("fault = [[1]]", "fault has to be a text"),
             ("simulate = true\nstream = \"-\"", "give --stream - on the command line"),
+            (
+                "place = { xyz_m = [0, 0, 0], rpy_rad = [0, 0, 90] }",
+                "patch thumb of skins/hand.toml: place: 90 in rpy_rad",
+            ),
+            ("place = { xyz = [0, 0, 0] }", "unknown field `xyz`"),
+            ("place = { rpy_rad = [0, 0, 0] }", "missing field `xyz_m`"),
+            ("place = [0, 0]", "write it as { xyz_m = [x, y, z], rpy_rad = [roll, pitch, yaw] }"),
         ] {
             assert!(of(options).contains(what), "{options}: {}", of(options));
         }

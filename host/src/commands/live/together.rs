@@ -11,6 +11,7 @@ use tactomo::run::Snapshot;
 use tactomo::run::options::{Ends, RunOptions, Summary};
 use tactomo::sink::Sinks;
 use tactomo::sink::page::{PageSetup, Shown};
+use tactomo::sink::place::Place;
 use tactomo::solve::ContactSettings;
 use tactomo_cli::output::message;
 use tactomo_cli::{interrupt, output};
@@ -26,6 +27,8 @@ const REQUESTS: usize = 64;
 struct Begun {
     /// Its name among several.
     name: String,
+    /// Where it lies on a body.
+    place: Option<Place>,
     source: Box<dyn Source>,
     options: RunOptions,
     ends: Ends,
@@ -47,7 +50,7 @@ pub fn show_all(shows: Vec<(String, Show)>, streams: Option<&StreamArgs>) -> any
     let mut of_all = Sinks::new(Arc::clone(&stop));
     if let Some(streams) = streams {
         streams.check(picture.json)?;
-        let detectors = begun.iter().map(|begun| begun.streamed.clone().of_patch(&begun.name)).collect();
+        let detectors = begun.iter().map(|begun| begun.streamed.clone().of_patch(&begun.name, begun.place)).collect();
         of_all = streams.begin(detectors, door(&picture), Arc::clone(&stop))?;
     }
     let listeners = of_all.listeners(begun.iter().map(|begun| begun.name.as_str()));
@@ -84,9 +87,12 @@ fn begin(name: String, mut show: Show, stop: &Arc<AtomicBool>) -> anyhow::Result
         finger: show.finger,
     };
     let options = options(&name, &mut show, problem, sinks.listener())?;
+    // One of several that is not there yet keeps none of the others waiting.
+    let options = RunOptions { waits: !name.is_empty(), ..options };
     let ends = Ends { snapshots, requests, stop: Arc::clone(stop) };
-    let shown = Shown { name: name.clone(), setup, snapshots: newest, requests: request };
-    Ok((Begun { name, source: show.source, options, ends, sinks, streamed, json: show.picture.json }, shown))
+    let Show { source, place, picture, .. } = show;
+    let shown = Shown { name: name.clone(), place, setup, snapshots: newest, requests: request };
+    Ok((Begun { name, place, source, options, ends, sinks, streamed, json: picture.json }, shown))
 }
 
 /// Shows one detector to its end, and says what that came to, unless whoever reads what it or all write has gone: then it ends as quietly as

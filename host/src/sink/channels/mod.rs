@@ -1,5 +1,5 @@
-//! What Foxglove and MCAP files get: four channels of JSON, made from an event. Of several detectors, each has four of its own, such as
-//! `/tactomo/thumb/touch`, and a frame of its own name.
+//! What Foxglove and MCAP files get: channels of JSON, made from an event. Of several detectors, each has its own, such as `/tactomo/thumb/touch`, and
+//! a frame of its own name, which is in that of the body where it has a [`Place`] there.
 //!
 //! | topic | schema | what |
 //! |---|---|---|
@@ -7,6 +7,7 @@
 //! | `/tactomo/contacts` | `foxglove.SceneUpdate` | contacts as discs, a shape as a line or a ring |
 //! | `/tactomo/image` | `foxglove.PointCloud` | the image: a point at each node, if the answer has one |
 //! | `/tactomo/readings` | `foxglove.Grid` | the readings as measured, as they are used, and as the solver got them, 64 bits each |
+//! | `/tactomo/thumb/tf` | `foxglove.FrameTransform` | where the detector is on the body, once a second, if that is told |
 //!
 //! The schemas of Foxglove are those of its documentation (<https://docs.foxglove.dev/docs/sdk/schemas>), in JSON, where bytes are base64.
 
@@ -23,6 +24,7 @@ use tactomo_physics::forward::ImageMesh;
 
 use super::feed::Delivery;
 use super::lines::Fields;
+use super::place::{BODY, Place};
 
 /// What places of a detector that is alone are relative to.
 pub(super) const FRAME: &str = "tactomo";
@@ -38,11 +40,13 @@ pub enum Channel {
     Image,
     /// The readings.
     Readings,
+    /// Where the detector is on the body.
+    Transform,
 }
 
 impl Channel {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Touch, Self::Contacts, Self::Image, Self::Readings];
+    pub const ALL: [Self; 5] = [Self::Touch, Self::Contacts, Self::Image, Self::Readings, Self::Transform];
 
     /// What its topic ends in.
     fn name(self) -> &'static str {
@@ -51,6 +55,7 @@ impl Channel {
             Self::Contacts => "contacts",
             Self::Image => "image",
             Self::Readings => "readings",
+            Self::Transform => "tf",
         }
     }
 
@@ -61,6 +66,7 @@ impl Channel {
             Self::Contacts => "foxglove.SceneUpdate",
             Self::Image => "foxglove.PointCloud",
             Self::Readings => "foxglove.Grid",
+            Self::Transform => "foxglove.FrameTransform",
         }
     }
 
@@ -71,6 +77,7 @@ impl Channel {
             Self::Contacts => schemas::scene_update(),
             Self::Image => schemas::point_cloud(),
             Self::Readings => schemas::grid(),
+            Self::Transform => schemas::frame_transform(),
         };
         schema.to_string()
     }
@@ -97,7 +104,12 @@ impl Topics {
 
     /// All topics, in an order that stays.
     pub fn all(&self) -> impl Iterator<Item = Topic> {
-        (0..self.0.len()).flat_map(|detector| Channel::ALL.map(|channel| Topic { detector, channel }))
+        let of = |(detector, messages): (usize, &Messages)| {
+            let (place, topic) = (messages.place, move |channel| Topic { detector, channel });
+            let has = move |channel: &Channel| *channel != Channel::Transform || place.is_some();
+            Channel::ALL.into_iter().filter(has).map(topic)
+        };
+        self.0.iter().enumerate().flat_map(of)
     }
 
     /// What a topic is called.
@@ -125,6 +137,8 @@ impl Topics {
 pub struct Messages {
     /// Its name among several; empty if it is alone.
     patch: Arc<str>,
+    /// Where it is on the body, if that is told.
+    place: Option<Place>,
     mesh: ImageMesh,
     usual_radius_m: f64,
     /// Corners of what the detector takes up (m).
@@ -134,12 +148,17 @@ pub struct Messages {
 impl Messages {
     /// For a detector with images on such a mesh; contacts whose radius is not known are drawn with the usual one (m).
     pub fn new(detector: &Detector, mesh: ImageMesh, usual_radius_m: f64) -> Self {
-        Self { patch: Arc::default(), mesh, usual_radius_m, bounds_m: detector.outline.bounds() }
+        Self { patch: Arc::default(), place: None, mesh, usual_radius_m, bounds_m: detector.outline.bounds() }
     }
 
     /// The same, of one of several by this name.
     pub fn of_patch(self, name: &str) -> Self {
         Self { patch: name.into(), ..self }
+    }
+
+    /// The same, at a place on the body, if it has one there.
+    pub fn at(self, place: Option<Place>) -> Self {
+        Self { place, ..self }
     }
 
     /// What places are relative to: the detector, with x and y from its middle.
@@ -166,6 +185,10 @@ impl Messages {
             Channel::Readings => {
                 put(&packed::readings([&event.frame.measured, &event.frame.used, &event.touch], self.bounds_m, at), out)
             }
+            Channel::Transform => match self.place.filter(|_| delivery.renews) {
+                Some(place) => put(&FrameTransform::of(&place, at), out),
+                None => return Ok(false),
+            },
         }?;
         Ok(true)
     }
@@ -230,6 +253,29 @@ impl Pose {
     }
 }
 
+/// A `foxglove.FrameTransform`: where the frame of a detector is.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct FrameTransform<'a> {
+    timestamp: Stamp,
+    parent_frame_id: &'a str,
+    child_frame_id: &'a str,
+    translation: Vector3,
+    rotation: Quaternion,
+}
+
+impl<'a> FrameTransform<'a> {
+    fn of(place: &Place, At { frame_id, stamp }: At<'a>) -> Self {
+        let [x, y, z, w] = place.rotation().coords.into();
+        Self {
+            timestamp: stamp,
+            parent_frame_id: BODY,
+            child_frame_id: frame_id,
+            translation: place.xyz_m.into(),
+            rotation: Quaternion { x, y, z, w },
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
@@ -245,7 +291,8 @@ mod tests {
 
     fn messages() -> Messages {
         let mesh = ImageMesh { nodes_m: vec![[0.01, 0.02], [-0.01, 0.0]], ..ImageMesh::default() };
-        Messages::new(&Detector::default(), mesh, 2e-3)
+        let place = Place { xyz_m: [0.1, 0.0, -0.02], rpy_rad: [0.0, 0.0, std::f64::consts::FRAC_PI_2] };
+        Messages::new(&Detector::default(), mesh, 2e-3).of_patch("thumb").at(Some(place))
     }
 
     fn message(channel: Channel, event: TouchEvent) -> Option<Value> {
@@ -335,5 +382,19 @@ mod tests {
         let found: Vec<f32> = data.chunks(4).map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap())).collect();
         assert_eq!(found, [0.01, 0.02, 0.0, 0.5, -0.01, 0.0, 0.0, 1.5]);
         assert!(message(Channel::Image, TouchEvent::of(0, Solution::default())).is_none());
+    }
+    #[test]
+    fn a_place_is_a_transform_from_the_body_and_one_that_is_not_told_has_no_channel() {
+        let transform = message(Channel::Transform, TouchEvent::of(0, Solution::default())).unwrap();
+        assert_eq!([&transform["parent_frame_id"], &transform["child_frame_id"]], ["body", "thumb"]);
+        assert_eq!(transform["translation"], serde_json::json!({ "x": 0.1, "y": 0.0, "z": -0.02 }));
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        for (name, value) in [("x", 0.0), ("y", 0.0), ("z", half), ("w", half)] {
+            let found = transform["rotation"][name].as_f64().unwrap();
+            assert!((found - value).abs() < 1e-12, "{name}: {found}");
+        }
+        let topics = Topics::new(vec![messages(), messages().of_patch("palm").at(None)]);
+        let names: Vec<_> = topics.all().map(|topic| topics.name(topic)).collect();
+        assert!(names.contains(&"/tactomo/thumb/tf".to_owned()) && names.len() == 9, "{names:?}");
     }
 }

@@ -61,9 +61,12 @@ fn color() -> Value {
     numbers("foxglove.Color", &["r", "g", "b", "a"])
 }
 
+fn quaternion() -> Value {
+    numbers("foxglove.Quaternion", &["x", "y", "z", "w"])
+}
+
 fn pose() -> Value {
-    let orientation = numbers("foxglove.Quaternion", &["x", "y", "z", "w"]);
-    titled("foxglove.Pose", &[("position", vector3()), ("orientation", orientation)])
+    titled("foxglove.Pose", &[("position", vector3()), ("orientation", quaternion())])
 }
 
 fn packed_fields() -> Value {
@@ -98,6 +101,19 @@ pub(super) fn grid() -> Value {
             ("cell_stride", integer()),
             ("fields", packed_fields()),
             ("data", bytes()),
+        ],
+    )
+}
+
+pub(super) fn frame_transform() -> Value {
+    titled(
+        "foxglove.FrameTransform",
+        &[
+            ("timestamp", time("time")),
+            ("parent_frame_id", text()),
+            ("child_frame_id", text()),
+            ("translation", vector3()),
+            ("rotation", quaternion()),
         ],
     )
 }

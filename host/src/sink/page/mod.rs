@@ -8,6 +8,7 @@ mod access;
 mod assets;
 mod calibrating;
 mod messages;
+mod setup;
 mod socket;
 mod update;
 mod wire;
@@ -26,6 +27,7 @@ use tokio::sync::{Semaphore, oneshot, watch};
 use self::access::Access;
 use super::address::Address;
 use super::door::Door;
+use super::place::Place;
 use super::web::{self, PLAIN, Response, response};
 use crate::run::{Request, Snapshot};
 use tactomo_physics::causes::with_causes;
@@ -50,6 +52,8 @@ const MAX_PAGE_MESSAGE: usize = 2048;
 pub struct Shown {
     /// Its name among others, which is part of the address of its page: letters, digits, `-` and `_`.
     pub name: String,
+    /// Where it lies on a body, if that is told.
+    pub place: Option<Place>,
     /// What does not change.
     pub setup: PageSetup,
     /// The newest of what there is to show.
@@ -65,7 +69,7 @@ impl Shown {
         snapshots: watch::Receiver<Arc<Snapshot>>,
         requests: SyncSender<Request>,
     ) -> Vec<Self> {
-        vec![Self { name: String::new(), setup, snapshots, requests }]
+        vec![Self { name: String::new(), place: None, setup, snapshots, requests }]
     }
 }
 
@@ -219,7 +223,7 @@ impl Server {
         let prefix = access.prefix();
         let picture = |shown: Shown| {
             let name = || shown.setup.detector.name.clone();
-            let setup_message = wire::setup(&shown.setup, &shown.name)
+            let setup_message = setup::message(&shown.setup, (&shown.name, shown.place))
                 .map_err(|source| ServerError::PageSetup { detector: name(), source })?;
             Ok(Arc::new(Picture { shown, setup_message, rezeros: AtomicU64::new(0), door: listen.door.clone() }))
         };

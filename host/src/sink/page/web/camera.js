@@ -1,8 +1,12 @@
-// The eye in space: turned by dragging, brought nearer with the wheel or two fingers.
+// The eye in space: turned by dragging and by arrow keys, brought nearer with the wheel, two fingers, or plus and minus.
 
 const TURN = 0.008;
 const ZOOM = 0.0012;
 const [NEAREST, FARTHEST] = [0.4, 3];
+// What a key does: turns (rad), tilts (rad), brings nearer (a factor).
+const KEYS = {
+  ArrowLeft: [-0.1, 0, 1], ArrowRight: [0.1, 0, 1], ArrowUp: [0, -0.1, 1], ArrowDown: [0, 0.1, 1], "+": [0, 0, 1.15], "=": [0, 0, 1.15], "-": [0, 0, 1 / 1.15],
+};
 // Distance of the eye, in sizes of the detector: from nearer, perspective exaggerates.
 const DISTANCE = 3.4;
 // A unit vector: to the left, up, towards the eye.
@@ -10,10 +14,27 @@ const OVER_THE_SHOULDER = [0.5, 0.55, 0.67];
 
 /** Turns places (m) into pixels. */
 export class Camera {
-  constructor({ turn }) {
-    this.turn = turn;
-    this.tilt = 0.7;
-    this.zoom = 1;
+  turn; tilt; zoom; lowest; begin;
+
+  /** Looks from where a shape says, and never from below `lowest` (rad). */
+  constructor({ turn, tilt = 0.7 }, lowest = -0.2) {
+    Object.assign(this, { turn, tilt, lowest, zoom: 1, begin: { turn, tilt, zoom: 1 } });
+  }
+
+  /** Looks as at the beginning. */
+  reset() { Object.assign(this, this.begin); }
+
+  /** Does what a key asks, if it asks something; returns whether it did. */
+  press({ key, ctrlKey, metaKey, altKey }) {
+    if (ctrlKey || metaKey || altKey) return false;
+    if (key === "0" || key === "Home") this.reset();
+    else if (!KEYS[key]) return false;
+    else {
+      const [turn, tilt, factor] = KEYS[key];
+      this.#turnBy(turn / TURN, tilt / TURN);
+      this.#zoomBy(factor);
+    }
+    return true;
   }
 
   /** Makes `element` turn the camera; calls `changed` when it did. */
@@ -52,10 +73,18 @@ export class Camera {
   /** Turns by so many pixels of dragging. */
   #turnBy(dx, dy) {
     this.turn += TURN * dx;
-    this.tilt = Math.min(Math.PI / 2, Math.max(-0.2, this.tilt + TURN * dy));
+    this.tilt = Math.min(Math.PI / 2, Math.max(this.lowest, this.tilt + TURN * dy));
   }
 
   #zoomBy(factor) { this.zoom = Math.min(FARTHEST, Math.max(NEAREST, this.zoom * factor)); }
+
+  /** Where a direction points on the screen: right, down and away. */
+  direction(direction) {
+    const [dx, dy, dz] = direction;
+    const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
+    const away = dx * sinTurn + dy * cosTurn;
+    return [dx * cosTurn - dy * sinTurn, -away * sinTilt - dz * cosTilt, away * cosTilt - dz * sinTilt];
+  }
 
   /** The direction that light comes from: over the left shoulder of who looks. */
   light() {

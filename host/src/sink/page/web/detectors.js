@@ -1,5 +1,6 @@
-// The page of several detectors: a tile for each, which opens the page of that one.
+// The page of several detectors: a tile for each, which opens the page of that one; and where they have places on a body, that body in space.
 
+import { BodyView } from "./body.js";
 import { listenForTheme, theme } from "./theme.js";
 import { Tile } from "./tile.js";
 import { write } from "./words.js";
@@ -9,7 +10,14 @@ const known = JSON.stringify(names);
 // Time between two looks at whether another program has taken the address (ms).
 const LOOK_EVERY = 2000;
 const box = document.getElementById("tiles");
-const tiles = names.map((name) => new Tile(name, theme(), () => tell()));
+const body = new BodyView(theme());
+const tiles = names.map((name) => new Tile(name, theme(), {
+  known: (tile) => {
+    if (body.add(tile)) arrange();
+  },
+  changed: () => tell(),
+  drawn: (tile) => body.take(tile),
+}));
 box.append(...tiles.map((tile) => tile.element));
 
 // How all of them fare, in the page's first line.
@@ -45,6 +53,12 @@ setInterval(async () => {
 arrange();
 window.addEventListener("resize", arrange);
 tell();
-listenForTheme((name) => tiles.forEach((tile) => tile.recolour(name)));
-const sizes = new ResizeObserver(() => tiles.forEach((tile) => tile.layOut()));
-tiles.forEach((tile) => sizes.observe(tile.plot));
+listenForTheme((name) => {
+  tiles.forEach((tile) => tile.recolour(name));
+  body.recolour(name);
+});
+const sizes = new ResizeObserver(() => {
+  tiles.forEach((tile) => tile.layOut());
+  body.layOut();
+});
+[...tiles, body].forEach((shown) => sizes.observe(shown.plot));

@@ -4,6 +4,7 @@ import { write } from "./words.js";
 
 const LINK_TEXT = {
   searching: "Looking for a board: connect it by USB",
+  absent: "Waiting for the board",
   waiting: "A board is connected and has not answered yet",
   streaming: "Live",
   silent: "The board answers and sends no readings",

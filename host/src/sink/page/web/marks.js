@@ -46,9 +46,14 @@ export function drawMark(context, contact, [x, y], perM, colours) {
     context.stroke();
   }
   drawEllipse(context, contact, [x, y], perM, colour);
+  drawDot(context, contact, [x, y], colours);
+}
+
+/** A contact's centre at `[x, y]` pixels. */
+export function drawDot(context, { id }, [x, y], colours) {
   context.beginPath();
   context.arc(x, y, 3, 0, 2 * Math.PI);
-  context.fillStyle = colour;
+  context.fillStyle = colours.hue(id);
   context.fill();
   context.lineWidth = 1.5;
   context.strokeStyle = colours.card;

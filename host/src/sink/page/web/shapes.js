@@ -2,7 +2,7 @@
 
 import { densityOf } from "./heat.js";
 
-// Points along the longer side of a flat detector.
+// Points along the longer side of a flat detector that has the picture for itself.
 const GRID = 96;
 // Height of what has the colour of the scale's end, and thickness of the sheet, as shares of the detector's longer side.
 const RISE = 0.26;
@@ -62,30 +62,39 @@ export function normalsOf(points, triangles, normals) {
 class Plate {
   pixels;
 
-  constructor({ bounds_m: [[left, bottom], [right, top]], outline_m: loops }) {
+  constructor({ bounds_m: [[left, bottom], [right, top]], outline_m: loops }, grid) {
     this.sizeM = Math.max(right - left, top - bottom);
     const ends = [-THICKNESS, RISE].map((share) => share * this.sizeM);
     this.centre = [(left + right) / 2, (bottom + top) / 2, (ends[0] + ends[1]) / 2];
+    /** Corners of the box that it takes up, as it rises (m). */
+    this.boxM = [[left, bottom, ends[0]], [right, top, ends[1]]];
     this.radiusM = Math.hypot(right - left, top - bottom) / 2;
     this.halfHeightM = (ends[1] - ends[0]) / 2;
     // The longer side lies across the picture.
     this.turn = top - bottom > 1.5 * (right - left) ? 1.2 : right - left > 1.5 * (top - bottom) ? -0.35 : -0.6;
-    const cellM = this.sizeM / GRID;
+    const cellM = this.sizeM / grid;
     const [columns, rows] = [right - left, top - bottom].map((side) => Math.max(2, Math.round(side / cellM)));
     const at = (i, k) => k * (columns + 1) + i;
+    const below = (columns + 1) * (rows + 1);
+    const low = new Set();
     this.places = [];
-    for (let k = 0; k <= rows; k += 1) {
-      for (let i = 0; i <= columns; i += 1) this.places.push([left + ((right - left) * i) / columns, bottom + ((top - bottom) * k) / rows]);
+    for (const isLow of [false, true]) {
+      for (let k = 0; k <= rows; k += 1) {
+        for (let i = 0; i <= columns; i += 1) {
+          if (isLow) low.add(this.places.length);
+          this.places.push([left + ((right - left) * i) / columns, bottom + ((top - bottom) * k) / rows]);
+        }
+      }
     }
     const triangles = [];
     for (let k = 0; k < rows; k += 1) {
       for (let i = 0; i < columns; i += 1) {
         const middle = [left + ((right - left) * (i + 0.5)) / columns, bottom + ((top - bottom) * (k + 0.5)) / rows];
         if (!isInside(loops, middle)) continue;
-        triangles.push(at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k), at(i + 1, k + 1), at(i, k + 1));
+        const cell = [at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k), at(i + 1, k + 1), at(i, k + 1)];
+        triangles.push(...cell, ...cell.map((corner) => below + corner).reverse());
       }
     }
-    const low = new Set();
     for (const loop of loops) this.#addWall(loop, cellM, low, triangles);
     this.triangles = Uint32Array.from(triangles);
     this.points = Float32Array.from(this.places.flatMap((place, i) => [...place, low.has(i) ? ends[0] : 0]));
@@ -156,6 +165,7 @@ class Curved {
     this.centre = ends.map(([low, high]) => (low + high) / 2);
     this.sizeM = Math.max(...ends.map(([low, high]) => high - low));
     const halves = ends.map(([low, high]) => (high - low) / 2);
+    this.boxM = [-1, 1].map((sign) => this.centre.map((value, k) => value + sign * (halves[k] + SWELL * this.sizeM)));
     this.radiusM = Math.hypot(halves[0], halves[1]) + SWELL * this.sizeM;
     this.halfHeightM = halves[2] + SWELL * this.sizeM;
     this.turn = -0.6;
@@ -196,5 +206,8 @@ class Curved {
   topOf({ place }) { return place; }
 }
 
-/** The shape of a detector: `points`, `triangles`, those of them that are `raised`, `shares` of the colours, and `update(field, scale)`. */
-export const shapeOf = (setup) => (setup.places_m.length ? new Curved(setup) : new Plate(setup));
+/**
+ * The shape of a detector: `points`, `triangles`, those of them that are `raised`, `shares` of the colours, and `update(field, scale)`; a flat one with
+ * `grid` points along its longer side.
+ */
+export const shapeOf = (setup, grid = GRID) => (setup.places_m.length ? new Curved(setup) : new Plate(setup, grid));

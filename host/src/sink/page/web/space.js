@@ -2,19 +2,18 @@
 
 import { middleOf } from "./bars.js";
 import { Camera } from "./camera.js";
-import { colourMaps } from "./colours.js";
 import { drawBar, FrameCanvas } from "./frame.js";
 import { sizeCanvas } from "./layout.js";
 import { drawLabels, drawTrail } from "./marks.js";
 import { faded } from "./palette.js";
-import { normalsOf, shapeOf } from "./shapes.js";
-import { DepthImage, MATT, shadesOf } from "./triangles.js";
+import { shapeOf } from "./shapes.js";
+import { heatShades, Solid } from "./solid.js";
+import { DepthImage } from "./triangles.js";
 
 // More pixels than this are not drawn one by one.
 const MOST_PIXELS = 420_000;
 // An edge is drawn in so many pieces, each of which may be hidden.
 const EDGE_PIECES = 48;
-const SHADES = { light: { darkest: 0.5, lift: -14 }, dark: { darkest: 0.4, lift: 34 } };
 // Pixels at the right that belong to the colour bar.
 const BAR = { width: 96, narrow: 58, narrowBelow: 520 };
 
@@ -28,12 +27,8 @@ export class SpaceView {
     this.frame = new FrameCanvas();
     this.marks = document.getElementById("marks");
     this.shape = shapeOf(view.setup);
+    this.solid = new Solid(this.shape);
     this.camera = new Camera(this.shape);
-    const count = this.shape.shares.length;
-    this.normals = new Float32Array(3 * count);
-    /** @type {any} */
-    this.screen = { share: this.shape.shares };
-    for (const name of ["x", "y", "z", "light"]) this.screen[name] = new Float32Array(count);
   }
 
   /** Fits into a box of pixels. */
@@ -52,12 +47,11 @@ export class SpaceView {
 
   /** Draws all of it. */
   draw(now) {
-    const { view: { field, scale }, shape, depth } = this;
+    const { view: { field, scale }, shape, solid, depth } = this;
     this.#drawRest();
-    shape.update(field, scale);
-    this.#project(shape.raised);
+    solid.update(field, scale);
     depth.restore();
-    depth.draw(shape.raised, this.screen, this.shades);
+    solid.drawRaised(this.camera, shape, depth, this.shades);
     this.canvas.getContext("2d").putImageData(depth.image, 0, 0);
     this.#drawOver(now);
   }
@@ -68,28 +62,10 @@ export class SpaceView {
     const look = [theme, depth.width, depth.height, camera.turn, camera.tilt, camera.zoom].join();
     if (look === this.look) return;
     this.look = look;
-    this.shades = shadesOf(colourMaps(theme).image, SHADES[theme]);
-    shape.settle();
+    this.shades = heatShades(theme);
     depth.clear();
-    if (shape.raised !== shape.triangles) {
-      this.#project(shape.triangles);
-      depth.draw(shape.triangles, this.screen, this.shades);
-    }
+    this.solid.drawRest(camera, shape, depth, this.shades);
     depth.keep();
-  }
-
-  #project(triangles) {
-    const { shape: { points }, normals, screen, depth } = this;
-    normalsOf(points, triangles, normals);
-    this.camera.project(this.shape, points, screen, depth.width, depth.height);
-    const [x, y, z] = this.camera.light();
-    const [hx, hy, hz] = this.camera.shine();
-    for (let i = 0, k = 0; i < screen.x.length; i += 1, k += 3) {
-      const [nx, ny, nz] = [normals[k], normals[k + 1], normals[k + 2]];
-      const facing = nx * x + ny * y + nz * z;
-      const shining = Math.max(0, nx * hx + ny * hy + nz * hz) ** 24;
-      screen.light[i] = MATT * (0.5 + 0.5 * facing) + (1 - MATT) * shining;
-    }
   }
 
   #drawOver(now) {
@@ -122,24 +98,7 @@ export class SpaceView {
   #drawRims(at) {
     this.over.strokeStyle = faded(this.view.colours.muted, 0.7);
     this.over.lineWidth = 1;
-    this.over.beginPath();
-    for (const rim of this.shape.rimsM) {
-      rim.forEach((corner, i) => this.#addEdge(at, corner, rim[(i + 1) % rim.length]));
-    }
-    this.over.stroke();
-  }
-
-  // The pieces of an edge that are not behind something.
-  #addEdge(at, from, to) {
-    let before = null;
-    for (let i = 0; i <= EDGE_PIECES; i += 1) {
-      const [x, y, z] = at(...from.map((v, k) => v + ((to[k] - v) * i) / EDGE_PIECES));
-      if (before && (before.shows || this.#shows(x, y, z))) {
-        this.over.moveTo(before.x, before.y);
-        this.over.lineTo(x, y);
-      }
-      before = { x, y, shows: this.#shows(x, y, z) };
-    }
+    this.solid.drawRims(this.over, at, (x, y, z) => this.#shows(x, y, z), EDGE_PIECES);
   }
 
   #shows(x, y, z) {

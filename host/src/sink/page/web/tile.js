@@ -27,17 +27,17 @@ function wordsOf({ contacts, shape }) {
   return contacts.length === 1 ? "1 contact" : `${contacts.length} contacts`;
 }
 
-/** The tile of the detector of this name; calls `changed()` when how it fares has. */
+/** The tile of the detector of this name; tells `known(tile)` when it knows its detector, `changed()` when how it fares has, `drawn(tile)` when what touches may have. */
 export class Tile {
   isLive = false;
   isTouched = false;
   drawn = false;
   setup = null;
   waiting = null;
-  theme; changed; text; colours; scale; field; heat; at; over;
+  name; theme; told; text; colours; scale; field; heat; at; over;
 
-  constructor(name, theme, changed) {
-    Object.assign(this, { theme, changed });
+  constructor(name, theme, told) {
+    Object.assign(this, { name, theme, told });
     this.element = make("a", "tile card", null);
     this.element.href = `${name}/`;
     const head = make("span", "tile-head", this.element);
@@ -62,14 +62,17 @@ export class Tile {
     Object.assign(this, { setup, text: JSON.stringify(setup), colours: palette(), scale: scaleOf(setup), field: new HeatField(setup) });
     this.heat = new HeatCanvas(this.heatElement, this.field);
     this.layOut();
+    this.told.known(this);
   }
 
   #tell({ state, text }) {
+    const wasLive = this.isLive;
     this.isLive = state === "streaming" || state === "playing";
+    if (this.isLive !== wasLive) this.told.drawn(this);
     if (!this.isLive) this.isTouched = false;
     this.element.classList.toggle("stale", !this.isLive);
     if (!this.isLive || !this.drawn) write(this.said, text);
-    this.changed();
+    this.told.changed();
   }
 
   #update(update) {
@@ -88,9 +91,10 @@ export class Tile {
       const isTouched = contacts.length > 0 || shape !== null || update.image.length > 0;
       write(this.said, wordsOf(update));
       this.drawn = true;
-      const told = isTouched === this.isTouched;
+      const wasTouched = this.isTouched;
       this.isTouched = isTouched;
-      if (!told) this.changed();
+      if (isTouched || wasTouched) this.told.drawn(this);
+      if (isTouched !== wasTouched) this.told.changed();
     }
     this.connection.taken();
   }

@@ -75,6 +75,20 @@ export class DepthImage {
   }
 }
 
+/** Least depth of triangles between points of `x`, `y` (pixels) and `z` at a pixel; infinite off all of them. */
+export function depthAt(triangles, { x, y, z }, px, py) {
+  let least = Infinity;
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [a, b, c] = [triangles[t], triangles[t + 1], triangles[t + 2]];
+    const area = (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a]);
+    if (area === 0) continue;
+    const u = ((y[c] - y[a]) * (px - x[a]) - (x[c] - x[a]) * (py - y[a])) / area;
+    const v = ((x[b] - x[a]) * (py - y[a]) - (y[b] - y[a]) * (px - x[a])) / area;
+    if (u >= 0 && v >= 0 && u + v <= 1) least = Math.min(least, z[a] + u * (z[b] - z[a]) + v * (z[c] - z[a]));
+  }
+  return least;
+}
+
 // Share of the colours up to which `lift` reaches.
 const LIFTED = 0.35;
 
