@@ -124,7 +124,8 @@ def test_lerobot_reads_the_data_set_that_the_example_makes(tmp_path, monkeypatch
     monkeypatch.setattr("sys.argv", ["lerobot_dataset.py", *paths, "--fps", "30", "--task", "hold"])
     lerobot_dataset = example("lerobot_dataset")
     lerobot_dataset.main()
-    dataset = datasets.LeRobotDataset("local/dataset", root=paths[2])
+    # Its other reader of videos takes a system's FFmpeg.
+    dataset = datasets.LeRobotDataset("local/dataset", root=paths[2], video_backend="pyav")
     assert len(dataset) == 12 and dataset.fps == 30
     palm = lerobot_dataset.touches(paths[0])[0]
     for picture in range(12):
