@@ -9,7 +9,7 @@ use divan::counter::ItemsCount;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use tactomo_firmware::mux::{LatchLines, Latched, Transparent};
-use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Mux, Parts, Sampler, Serial, TimedOut};
+use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Mux, NoTouch, Parts, Sampler, Serial, TimedOut};
 use tactomo_protocol::{Command, MAX_COMMAND, Request, Settings, encode_request};
 
 fn main() {
@@ -95,7 +95,7 @@ fn frame<M: Mux<Error = Infallible>>(bencher: Bencher, mux: M, average_log2: u8)
     let serial = Line { commands: commands(average_log2), bytes_a_push: 2 };
     let adc = Adc::new(12, 3300);
     let identity = Identity { firmware_version: "0", board: "bench", electrodes: 16, adc, drive_mv: 2000 };
-    let parts = Parts { mux, sampler: Codes(1), serial, chip: NullChip };
+    let parts = Parts { mux, sampler: Codes(1), serial, chip: NullChip, touch: NoTouch };
     let Ok(mut board) = Board16::new(parts, identity) else { return };
     let conversions = 256usize << average_log2;
     bencher.counter(ItemsCount::new(conversions)).bench_local(|| while board.step() != Ok(Activity::Frame) {});

@@ -2,8 +2,8 @@
 
 use heapless::String;
 use tactomo_protocol::{
-    BoardMessage, Clock, Command, CommandReceiver, DecodeError, Fault, Hello, MAX_ELECTRODES, MIN_ELECTRODES, Plan,
-    Request, Settings, frame, scope, wire_bytes,
+    BoardMessage, Clock, Command, CommandReceiver, DecodeError, Fault, Hello, MAX_ELECTRODES, MIN_ELECTRODES, Output,
+    Plan, Request, Settings, TableState, contacts, frame, scope, wire_bytes,
 };
 
 use crate::inbox::Inbox;
@@ -12,19 +12,19 @@ use crate::rate::Rate;
 use crate::row::Attended;
 use crate::scan::{FrontEnd, Scan, Scanned};
 use crate::uplink::Uplink;
-use crate::{Adc, Chip, Mux, Parts, Sampler, Serial};
+use crate::{Adc, Chip, Mux, NoTouch, Parts, Sampler, Serial, Touch};
 
-/// Longest packet of a frame of `electrodes` on the wire, in bytes.
+/// Longest packets of a frame of `electrodes` and its contacts on the wire, in bytes.
 pub const fn frame_bytes(electrodes: usize) -> usize {
     wire_bytes(
         1 + frame::HEAD_BYTES + scope::MAX_SCOPE_BYTES + 2 * electrodes * electrodes + tactomo_protocol::CRC_BYTES,
-    )
+    ) + contacts::MAX_WIRE
 }
 
 /// A board with room for 16 electrodes.
-pub type Board16<M, S, L, C> = Board<M, S, L, C, 256, { frame_bytes(16) }>;
+pub type Board16<M, S, L, C, T = NoTouch> = Board<M, S, L, C, T, 256, { frame_bytes(16) }>;
 /// A board with room for 32 electrodes.
-pub type Board32<M, S, L, C> = Board<M, S, L, C, 1024, { frame_bytes(32) }>;
+pub type Board32<M, S, L, C, T = NoTouch> = Board<M, S, L, C, T, 1024, { frame_bytes(32) }>;
 
 /// What a board says about itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,8 +76,8 @@ pub enum Activity {
 
 /// A board: its parts, the scan, the uplink, and the state that commands change.
 #[derive(Debug)]
-pub struct Board<M, S, L, C, const READINGS: usize, const WIRE: usize> {
-    parts: Parts<M, S, L, C>,
+pub struct Board<M, S, L, C, T, const READINGS: usize, const WIRE: usize> {
+    parts: Parts<M, S, L, C, T>,
     adc: Adc,
     hello: Hello,
     inbox: Inbox,
@@ -92,14 +92,14 @@ pub struct Board<M, S, L, C, const READINGS: usize, const WIRE: usize> {
     boot_fault: Option<Fault>,
 }
 
-impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: usize>
-    Board<M, S, L, C, READINGS, WIRE>
+impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, const WIRE: usize>
+    Board<M, S, L, C, T, READINGS, WIRE>
 {
     /// A board that will say Hello and wait for commands.
     ///
     /// # Errors
     /// [`NewBoardError`] if the identity does not fit the protocol or this type's room.
-    pub fn new(parts: Parts<M, S, L, C>, identity: Identity) -> Result<Self, NewBoardError> {
+    pub fn new(mut parts: Parts<M, S, L, C, T>, identity: Identity) -> Result<Self, NewBoardError> {
         let electrodes = NewBoardError::Electrodes(identity.electrodes);
         if usize::from(identity.electrodes) < MIN_ELECTRODES || WIRE < frame_bytes(usize::from(identity.electrodes)) {
             return Err(electrodes);
@@ -117,6 +117,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         let scan = Scan::new(identity.electrodes, &identity.adc).ok_or(electrodes)?;
         let mut uplink = Uplink::default();
         uplink.message(&BoardMessage::Hello(hello.clone()));
+        parts.touch.meet(&hello);
         Ok(Self {
             parts,
             adc: identity.adc,
@@ -211,6 +212,24 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             Command::Scan(plan) => self.follow(plan, answers)?,
             Command::Rate { baud } if self.rate.ask(baud, &self.parts.serial) => {}
             Command::Rate { .. } => return Err(Fault::BadRate { answers }),
+            Command::Output(output) => self.choose(output, answers)?,
+            Command::Table(piece) => {
+                let fits = self.parts.touch.take(&piece);
+                self.uplink.message(&BoardMessage::Table(TableState { answers, ..self.parts.touch.table() }));
+                return if fits { Ok(()) } else { Err(Fault::NoTable { answers }) };
+            }
+        }
+        Ok(())
+    }
+
+    /// Chooses what is streamed.
+    fn choose(&mut self, output: Output, answers: u8) -> Result<(), Fault> {
+        let had_frames = self.parts.touch.output().has_frames();
+        if !self.parts.touch.set_output(output) {
+            return Err(Fault::NoTable { answers });
+        }
+        if output.has_frames() && !had_frames {
+            self.uplink.forget_keys();
         }
         Ok(())
     }
@@ -221,6 +240,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             self.stuck_reported = false;
             // Who starts it may be another host than before.
             self.uplink.forget_keys();
+            self.parts.touch.restart();
             self.restart_pace();
         }
     }
@@ -271,7 +291,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
 
     fn scan_row(&mut self) -> Result<Activity, M::Error> {
         let Self { parts, scan, uplink, inbox, .. } = self;
-        let Parts { mux, sampler, serial, chip } = parts;
+        let Parts { mux, sampler, serial, chip, .. } = parts;
         let line = &mut Line { uplink, serial, inbox };
         let mut front_end = FrontEnd { mux, sampler, chip, line, adc: self.adc, settings: self.hello.settings };
         match scan.row(&mut front_end)? {
@@ -288,7 +308,15 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             self.fault(Fault::AdcStuck);
         }
         self.stuck_reported = scanned.stuck;
-        self.uplink.frame(&scanned, self.scan.scope(), self.scan.readings());
+        let Self { parts, scan, uplink, inbox, .. } = self;
+        let Parts { serial, chip, touch, .. } = parts;
+        let mut attend = || {
+            chip.feed_watchdog();
+            Line { uplink, serial, inbox }.transfer(chip);
+        };
+        let contacts = touch.contacts(&scanned, scan.scope(), scan.readings(), &mut attend);
+        let readings = touch.output().has_frames().then(|| (scan.scope(), scan.readings()));
+        uplink.frame(&scanned, readings, contacts);
     }
 
     /// Says Hello in answer to the command with this tag, or, with 0, by itself.

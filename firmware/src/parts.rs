@@ -2,11 +2,11 @@
 
 use embedded_hal::delay::DelayNs;
 
-use crate::Row;
+use crate::{NoTouch, Row};
 
 /// The parts that a [`Board`](crate::Board) is made of.
 #[derive(Debug)]
-pub struct Parts<M, S, L, C> {
+pub struct Parts<M, S, L, C, T = NoTouch> {
     /// Grounds electrodes: a [`Mux`](crate::Mux).
     pub mux: M,
     /// Converts voltages: a [`Sampler`].
@@ -15,6 +15,8 @@ pub struct Parts<M, S, L, C> {
     pub serial: L,
     /// Clock, delay, watchdog: a [`Chip`].
     pub chip: C,
+    /// Finds contacts, if anything does: a [`Touch`](crate::Touch).
+    pub touch: T,
 }
 
 /// A conversion did not finish within the sampler's bound.

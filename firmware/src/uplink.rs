@@ -3,7 +3,9 @@
 //! Answers and faults go first, then frames; a packet of log may go between two frames. There is room for one frame, until all of it has gone.
 
 use heapless::Deque;
-use tactomo_protocol::{BoardMessage, Keys, MAX_LOG, Scope, encode_board, encode_keyed, encode_log, wire_bytes};
+use tactomo_protocol::{
+    BoardMessage, Contacts, Keys, MAX_LOG, Scope, encode_board, encode_contacts, encode_keyed, encode_log, wire_bytes,
+};
 
 use crate::scan::Scanned;
 use crate::{Chip, Serial};
@@ -137,9 +139,9 @@ impl<const READINGS: usize, const WIRE: usize> Uplink<READINGS, WIRE> {
         !self.frame_waits && self.sending != Sending::Frame
     }
 
-    /// Encodes a frame, by what it differs by from its key if it has one. It takes the place and the number of one of which no byte is gone. It is
-    /// dropped if another is being sent.
-    pub fn frame(&mut self, scanned: &Scanned, scope: &Scope, readings: &[u16]) {
+    /// Encodes a frame: its contacts, and its readings by what they differ by from their key if they have one. It takes the place and the number of one of
+    /// which no byte is gone. It is dropped if another is being sent.
+    pub fn frame(&mut self, scanned: &Scanned, readings: Option<(&Scope, &[u16])>, contacts: Option<Contacts>) {
         if self.frame_waits {
             // The host has not got the last frame, nor its key.
             self.forget_keys();
@@ -152,7 +154,12 @@ impl<const READINGS: usize, const WIRE: usize> Uplink<READINGS, WIRE> {
             self.sequence = self.sequence.wrapping_add(1);
         }
         let head = scanned.head(self.sequence);
-        self.frame.length = encode_keyed(head, scope, readings, &mut self.keys, &mut self.frame.bytes).unwrap_or(0);
+        let Packet { bytes, length } = &mut self.frame;
+        *length = contacts.map_or(0, |contacts| encode_contacts(&Contacts { head, ..contacts }, bytes).unwrap_or(0));
+        if let Some((scope, readings)) = readings {
+            let rest = bytes.get_mut(*length..).unwrap_or_default();
+            *length += encode_keyed(head, scope, readings, &mut self.keys, rest).unwrap_or(0);
+        }
         self.frame_waits = self.frame.length > 0;
     }
 

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use crate::coded::Keys;
+use crate::contacts::Contacts;
 use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Fault, Hello, Kind, Log, Request};
 use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_READINGS, MAX_WIRE, OLDEST, Scope, VERSION, cobs};
@@ -179,6 +180,8 @@ fn board_message(packet: &[u8], keys: &mut Keys<MAX_READINGS>) -> Result<BoardMe
             fault => BoardMessage::Fault(fault),
         },
         Kind::Clock => BoardMessage::Clock(from_postcard(body)?),
+        Kind::Contacts => BoardMessage::Contacts(Contacts::read(body).ok_or(DecodeError::Body)?),
+        Kind::Table => BoardMessage::Table(from_postcard(body)?),
         Kind::Command => return Err(DecodeError::Body),
     })
 }

@@ -7,6 +7,7 @@
 use serde::Serialize;
 
 use crate::coded::{AGE_BYTES, Keys};
+use crate::contacts::Contacts;
 use crate::frame::{self, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Kind, Request};
 use crate::{CRC, CRC_BYTES, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, Scope, VERSION, cobs, wire_bytes};
@@ -57,6 +58,8 @@ pub fn encode_board(message: &BoardMessage, out: &mut [u8]) -> Result<usize, Enc
         BoardMessage::Frame(frame) => encode_rows(frame.head, &frame.scope, &frame.readings, out),
         BoardMessage::Log(log) => encode_log(&log.0, out),
         BoardMessage::Clock(clock) => encode_body(Kind::Clock, clock, out),
+        BoardMessage::Contacts(contacts) => encode_contacts(contacts, out),
+        BoardMessage::Table(state) => encode_body(Kind::Table, state, out),
         BoardMessage::Fault(fault) => encode_body(Kind::Fault, fault, out),
     }
 }
@@ -151,6 +154,14 @@ fn check(head: FrameHead, scope: &Scope, readings: &[u16]) -> Result<(), EncodeE
         return Err(EncodeError::FractionBits(head.fraction_bits));
     }
     Ok(())
+}
+
+/// Encodes contacts into `out`; returns the packet's length in bytes.
+///
+/// # Errors
+/// [`EncodeError::Full`] if `out` is too short.
+pub fn encode_contacts(contacts: &Contacts, out: &mut [u8]) -> Result<usize, EncodeError> {
+    write(Kind::Contacts, contacts.byte_count(), out, |body| contacts.write(body))
 }
 
 /// Encodes bytes of the defmt stream into `out`; returns the packet's length in bytes.

@@ -1,7 +1,7 @@
 //! The wire between a tomographic tactile sensor board and its host.
 //!
 //! The board sends [`BoardMessage`]s: who it is, its scans, its log and its faults. The host sends [`Request`]s. Both use this crate; it
-//! has no allocator, no floating point and no unsafe code, and it never panics, whatever comes down the line.
+//! has no allocator and no unsafe code, and it never panics, whatever comes down the line.
 //!
 //! A *packet* is one message. On the wire it is stuffed (COBS) and ends with a zero byte, so a receiver that joins in the
 //! middle, or gets noise or boot text, waits for the next zero and goes on. Inside:
@@ -9,7 +9,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 1 | head: protocol version in the high four bits, [kind](Kind) in the low four |
-//! | n | body: postcard, or for a frame the layout of [`frame`] |
+//! | n | body: postcard, or for frames and contacts the layout of [`frame`] and [`contacts`] |
 //! | 4 | CRC-32 (ISO-HDLC, as in zlib) of head and body, little-endian |
 //!
 //! Only head, CRC and COBS are promised to every future version: that is enough for a receiver to recognise a newer peer
@@ -50,6 +50,7 @@ extern crate std;
 mod cobs;
 pub mod coded;
 mod coding;
+pub mod contacts;
 pub mod decode;
 pub mod encode;
 pub mod frame;
@@ -57,8 +58,11 @@ pub mod message;
 pub mod scope;
 
 pub use coded::Keys;
+pub use contacts::{ContactCode, ContactFlags, Contacts, MAX_PIECE, Output, TableId, TablePiece, TableState};
 pub use decode::{BoardReceiver, CommandReceiver, Counters, DecodeError, Receiver};
-pub use encode::{EncodeError, encode_board, encode_frame, encode_keyed, encode_log, encode_request, encode_rows};
+pub use encode::{
+    EncodeError, encode_board, encode_contacts, encode_frame, encode_keyed, encode_log, encode_request, encode_rows,
+};
 pub use frame::{Frame, FrameHead, Status};
 pub use message::{
     BoardMessage, Clock, Command, ConverterErrors, Fault, Hello, Kind, Log, MAX_LOG, MAX_RANGES, Range, Request,

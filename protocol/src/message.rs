@@ -3,6 +3,7 @@
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
+use crate::contacts::{Contacts, Output, TablePiece, TableState};
 use crate::frame::Frame;
 use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Plan, coding};
 
@@ -26,15 +27,29 @@ pub enum Kind {
     Fault = 3,
     /// [`Frame`], board to host, as the [differences](crate::coded) from another.
     CodedFrame = 4,
+    /// [`Contacts`], board to host.
+    Contacts = 5,
     /// [`Clock`], board to host.
     Clock = 6,
+    /// [`TableState`], board to host.
+    Table = 7,
     /// [`Request`], host to board.
     Command = 8,
 }
 
 impl Kind {
     pub(crate) fn from_bits(bits: u8) -> Option<Self> {
-        let all = [Self::Hello, Self::Frame, Self::Log, Self::Fault, Self::CodedFrame, Self::Clock, Self::Command];
+        let all = [
+            Self::Hello,
+            Self::Frame,
+            Self::Log,
+            Self::Fault,
+            Self::CodedFrame,
+            Self::Contacts,
+            Self::Clock,
+            Self::Table,
+            Self::Command,
+        ];
         all.into_iter().find(|kind| *kind as u8 == bits)
     }
 }
@@ -53,6 +68,10 @@ pub enum BoardMessage {
     Fault(Fault),
     /// What the board's clock showed when it obeyed a command.
     Clock(Clock),
+    /// The contacts of one scan.
+    Contacts(Contacts),
+    /// What the board has of a table.
+    Table(TableState),
 }
 
 /// Who the board is, what its readings mean, and what it does.
@@ -250,6 +269,11 @@ pub enum Fault {
         /// Tag of the command.
         answers: u8,
     },
+    /// A command that takes a table which the board does not have, or a piece of one that it cannot take.
+    NoTable {
+        /// Tag of the command.
+        answers: u8,
+    },
 }
 
 /// Host to board: a command, and a tag by which the answer names it.
@@ -261,8 +285,8 @@ pub struct Request {
     pub command: Command,
 }
 
-/// What a board is to do. It answers each with [`Hello`], which names the tag, or with [`Fault::BadSettings`], [`Fault::BadPlan`] or
-/// [`Fault::BadRate`]; so a host can repeat a command until it is answered, and the repetition changes nothing.
+/// What a board is to do. It answers each with [`Hello`], which names the tag, or with [`Fault::BadSettings`], [`Fault::BadPlan`],
+/// [`Fault::BadRate`] or [`Fault::NoTable`]; so a host can repeat a command until it is answered, and the repetition changes nothing.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Command {
     /// Asks for [`Hello`].
@@ -280,4 +304,8 @@ pub enum Command {
         /// Bits a second on the line.
         baud: u32,
     },
+    /// Chooses what is streamed. Contacts take a table.
+    Output(Output),
+    /// Takes a piece of a table.
+    Table(TablePiece),
 }

@@ -16,11 +16,15 @@ const CHECK: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3
 /// The profile that the tests are built in.
 const PROFILE: &str = if cfg!(debug_assertions) { "dev" } else { "release" };
 
-/// Runs to its end; what it says is in the error if it fails.
+/// Letters of what a command says that are told when it fails: the end, where compilers and pytest say why.
+const TOLD: usize = 4000;
+
+/// Runs to its end; the end of what it says is in the error if it fails.
 fn run(command: &mut Command) -> Result<()> {
     let output = command.output().with_context(|| format!("{command:?} does not start"))?;
     let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
-    ensure!(output.status.success(), "{command:?} failed:\n{said}");
+    let end: String = said.chars().skip(said.chars().count().saturating_sub(TOLD)).collect();
+    ensure!(output.status.success(), "{command:?} failed ({}):\n{end}", output.status);
     Ok(())
 }
 

@@ -81,13 +81,45 @@ pub(crate) struct Fit {
     pub normal: Normal,
 }
 
+/// Work under way.
+pub(crate) struct Working<'a> {
+    /// What was done so far.
+    pub done: Work,
+    /// Called after each piece of it.
+    attend: &'a mut dyn FnMut(),
+}
+
+impl<'a> Working<'a> {
+    /// Nothing is done yet.
+    pub fn new(attend: &'a mut dyn FnMut()) -> Self {
+        Self { done: Work::default(), attend }
+    }
+
+    /// The readings of so many contacts and their derivatives were worked out.
+    fn worked_out(&mut self, contacts: usize) {
+        self.done.frames[contacts - 1] += 1;
+        (self.attend)();
+    }
+
+    /// A place was looked at for a first contact.
+    pub fn looked_at_first(&mut self) {
+        self.done.first_looks += 1;
+    }
+
+    /// A place was looked at for one more contact.
+    pub fn looked(&mut self) {
+        self.done.looks += 1;
+        (self.attend)();
+    }
+}
+
 /// What fits need.
-pub(crate) struct Fitter<'a, 't> {
+pub(crate) struct Fitter<'a, 't, 'w> {
     pub table: &'a Table<'t>,
     pub frame: &'a Frame<'a>,
     pub errors: &'a Errors,
     pub circuit: &'a mut Circuit,
-    pub work: &'a mut Work,
+    pub work: &'a mut Working<'w>,
     /// Standard deviation of the logarithms of radii.
     pub radius_deviation: f32,
 }
@@ -103,14 +135,14 @@ pub struct Work {
     pub looks: u32,
 }
 
-impl Fitter<'_, '_> {
+impl Fitter<'_, '_, '_> {
     /// What a scene leaves of the frame; `false` if it makes no sense.
     fn look(&mut self, scene: &Scene, normal: &mut Normal) -> bool {
         if scene.count == 0 || !self.circuit.solve(self.table, scene.spots()) {
             return false;
         }
-        self.work.frames[scene.count - 1] += 1;
         normal.sum_up(self.table, self.circuit, self.frame, self.errors, self.radius_deviation);
+        self.work.worked_out(scene.count);
         normal.objective().is_finite()
     }
 

@@ -5,7 +5,7 @@
 //! scalar product with the pattern of a place is a sum over electrodes, and a look costs some dozen multiplications.
 
 use crate::circuit::{Circuit, PerElectrode, Spot};
-use crate::fit::held_ohm;
+use crate::fit::{Working, held_ohm};
 use crate::frame::{Errors, Frame, left_v};
 use crate::normal::{Factor, MOST, Normal, RowSlopes};
 use crate::table::{MAX_ELECTRODES, Table};
@@ -66,7 +66,7 @@ fn places(table: &Table<'_>) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Where one contact would explain most of a frame, where there is none yet. Counts the looks.
-pub(crate) fn first(table: &Table<'_>, frame: &Frame<'_>, errors: &Errors, looks: &mut u32) -> Candidates {
+pub(crate) fn first(table: &Table<'_>, frame: &Frame<'_>, errors: &Errors, work: &mut Working<'_>) -> Candidates {
     let (head, n) = (table.head(), table.electrodes());
     let scales = row_scales(frame, n, head.drive_v);
     // Scalar products with `u_e - u_g` for each electrode, and with the rest of the patterns.
@@ -92,7 +92,7 @@ pub(crate) fn first(table: &Table<'_>, frame: &Frame<'_>, errors: &Errors, looks
         if !table.holds(at_m[0], at_m[1]) {
             continue;
         }
-        *looks += 1;
+        work.looked_at_first();
         let own_ohm = table.rough(i, j, &mut fields_ohm);
         let (mut along, mut square, mut squares, mut sum) = (of_rest, rest_square, 0.0, 0.0);
         for e in 0..n {
@@ -204,7 +204,7 @@ impl<'a, 't> Beside<'a, 't> {
     }
 
     /// Where one more contact would explain most. Counts the looks.
-    pub fn candidates(&self, errors: &Errors, looks: &mut u32) -> Candidates {
+    pub fn candidates(&self, errors: &Errors, work: &mut Working<'_>) -> Candidates {
         let (table, head) = (self.table, self.table.head());
         let mut all = Candidates::default();
         let (mut fields_ohm, mut potentials_ohm) = ([0.0; MAX_ELECTRODES], [0.0; MAX_ELECTRODES]);
@@ -218,7 +218,7 @@ impl<'a, 't> Beside<'a, 't> {
             if !table.holds(at_m[0], at_m[1]) || !there.all(is_free) {
                 continue;
             }
-            *looks += 1;
+            work.looked();
             let own_ohm = table.rough(i, j, &mut fields_ohm);
             self.circuit.potentials_ohm(table, at_m, &fields_ohm, &mut potentials_ohm);
             let (along, square) = self.look(&potentials_ohm);

@@ -5,7 +5,7 @@
 
 use crate::answer::{Answer, Contact, Flags};
 use crate::circuit::{Circuit, MAX_CONTACTS};
-use crate::fit::{Fit, Fitter, Scene, Work};
+use crate::fit::{Fit, Fitter, Scene, Work, Working};
 use crate::frame::{Errors, Frame, FrameError, Says};
 use crate::normal::{ANY_RADIUS, MOST, PARAMETERS, USUAL_RADIUS, Vector};
 use crate::scan::{Beside, CANDIDATES, Candidates, first};
@@ -91,9 +91,23 @@ impl Solver {
     /// # Errors
     /// [`FrameError`] if it cannot be a frame of the table's detector.
     pub fn solve(&mut self, table: &Table<'_>, frame: &Frame<'_>) -> Result<Answer, FrameError> {
+        self.solve_while(table, frame, &mut || {})
+    }
+
+    /// The contacts of a frame, where there is something else to attend to meanwhile: `attend` is called at least after every look at three contacts, or at
+    /// one place (some 100 000 floating-point operations).
+    ///
+    /// # Errors
+    /// As for [`solve`](Self::solve).
+    pub fn solve_while(
+        &mut self,
+        table: &Table<'_>,
+        frame: &Frame<'_>,
+        attend: &mut dyn FnMut(),
+    ) -> Result<Answer, FrameError> {
         frame.check(table)?;
         let task = Task { table, frame, errors: &Errors::of(frame, table) };
-        let mut work = Work::default();
+        let mut work = Working::new(attend);
         let before = self.scene;
         let mut found = self.followed(task, &mut work);
         let readings = task.readings();
@@ -114,7 +128,7 @@ impl Solver {
         }
         self.scene = found.map_or_else(Scene::default, |fit| fit.scene);
         self.number(&before);
-        Ok(self.answer(found, task, work))
+        Ok(self.answer(found, task, work.done))
     }
 
     fn may_search(&mut self) -> bool {
@@ -124,13 +138,13 @@ impl Solver {
     }
 
     /// What was found last, fitted to this frame, without what is no longer there.
-    fn followed(&mut self, task: Task<'_>, work: &mut Work) -> Option<Fit> {
+    fn followed(&mut self, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
         let fit = self.fit(self.scene, ANY_RADIUS, FOLLOWING, task, work)?;
         self.pruned(fit, task, work)
     }
 
     /// A fit without the contacts that the readings do not speak for; `None` if none is left.
-    fn pruned(&mut self, mut fit: Fit, task: Task<'_>, work: &mut Work) -> Option<Fit> {
+    fn pruned(&mut self, mut fit: Fit, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
         while let Some(gone) = weakest(&fit) {
             fit = self.fit(fit.scene.without(gone), ANY_RADIUS, SEARCHING, task, work)?;
         }
@@ -143,20 +157,20 @@ impl Solver {
         radius_deviation: f32,
         steps: usize,
         task: Task<'_>,
-        work: &mut Work,
+        work: &mut Working<'_>,
     ) -> Option<Fit> {
         let Task { table, frame, errors } = task;
         Fitter { table, frame, errors, circuit: &mut self.circuit, work, radius_deviation }.fit(scene, steps)
     }
 
     /// The best explanation that is found, from what was followed or from nothing.
-    fn search(&mut self, from: Option<Fit>, task: Task<'_>, work: &mut Work) -> Option<Fit> {
+    fn search(&mut self, from: Option<Fit>, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
         let best = from.and_then(|from| self.grown(from, task, work));
         // What there was more than is no place to go on from.
         if !self.more && best.is_some_and(|best| !is_misfit(&best, task.readings())) {
             return best;
         }
-        let candidates = first(task.table, task.frame, task.errors, &mut work.first_looks);
+        let candidates = first(task.table, task.frame, task.errors, work);
         if candidates[0].gain < FIRST_GAIN {
             return best;
         }
@@ -166,7 +180,7 @@ impl Solver {
     }
 
     /// The best fit of contacts of about the usual radius from some starts.
-    fn best_of(&mut self, starts: &[Option<Scene>; CANDIDATES], task: Task<'_>, work: &mut Work) -> Option<Fit> {
+    fn best_of(&mut self, starts: &[Option<Scene>; CANDIDATES], task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
         let mut best = None;
         for start in starts.iter().flatten() {
             best = better(best, self.fit(*start, USUAL_RADIUS, SEARCHING, task, work));
@@ -178,7 +192,7 @@ impl Solver {
     }
 
     /// The likeliest number of contacts from some that are found on, one more at a time.
-    fn grown(&mut self, from: Fit, task: Task<'_>, work: &mut Work) -> Option<Fit> {
+    fn grown(&mut self, from: Fit, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
         let (mut at, mut best) = (from, None);
         loop {
             best = better(best, self.fit(at.scene, ANY_RADIUS, SEARCHING, task, work));
@@ -193,17 +207,17 @@ impl Solver {
     }
 
     /// Notes what contacts leave, and whether another one would explain enough of it.
-    fn look_for_more(&mut self, found: Option<&Fit>, task: Task<'_>, work: &mut Work) {
+    fn look_for_more(&mut self, found: Option<&Fit>, task: Task<'_>, work: &mut Working<'_>) {
         self.searched = found.map_or(0.0, |fit| fit.normal.cost);
         self.more = found.is_some_and(|fit| self.beside(fit, task, work)[0].gain > FIRST_GAIN);
     }
 
     /// Where one more contact would explain most of what others leave.
-    fn beside(&mut self, fit: &Fit, task: Task<'_>, work: &mut Work) -> Candidates {
+    fn beside(&mut self, fit: &Fit, task: Task<'_>, work: &mut Working<'_>) -> Candidates {
         let Task { table, frame, errors } = task;
         let is_solved = self.circuit.solve(table, fit.scene.spots());
         let beside = is_solved.then(|| Beside::new(table, &self.circuit, frame, errors, &fit.normal)).flatten();
-        beside.map_or_else(Candidates::default, |beside| beside.candidates(errors, &mut work.looks))
+        beside.map_or_else(Candidates::default, |beside| beside.candidates(errors, work))
     }
 
     /// Gives contacts the numbers of the nearest ones before.

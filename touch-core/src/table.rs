@@ -52,6 +52,8 @@ pub const OTHERS: usize = 2;
 pub const RADII: usize = 2;
 
 const HEAD: usize = 92;
+/// Where the table's length stands.
+const LENGTH_AT: usize = 16;
 const QUANTITIES: usize = MAX_ELECTRODES + OTHERS;
 
 /// Why bytes are no table.
@@ -192,6 +194,13 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// How many bytes the table that begins so says that it has; `None` if these are the first bytes of none, or too few to tell.
+    pub fn announced_bytes(first: &[u8]) -> Option<usize> {
+        let is_table = first.first_chunk() == Some(&MAGIC);
+        let length = first.get(LENGTH_AT..LENGTH_AT + 4)?.first_chunk().map(|four| u32::from_le_bytes(*four))?;
+        is_table.then_some(length as usize)
+    }
+
     /// Reads a table that was read before, without its checksum, which takes as long as some frames.
     ///
     /// # Errors
@@ -215,7 +224,7 @@ impl<'a> Table<'a> {
         let knots = counted("coefficients over distances", 12, 4, MAX_KNOTS)?;
         let expected = bytes_of(electrodes, sides, knots);
         let found = bytes.len();
-        if found != expected || u32_at(16) as usize != expected {
+        if found != expected || u32_at(LENGTH_AT) as usize != expected {
             return Err(TableError::Length { found, expected });
         }
         let cut = || TableError::Length { found: bytes.len(), expected };

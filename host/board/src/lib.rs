@@ -17,3 +17,4 @@ pub mod sequence;
 pub mod session;
 pub mod simulated;
 pub mod source;
+pub mod table;

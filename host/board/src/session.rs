@@ -6,25 +6,25 @@ mod damage;
 mod greet;
 mod line;
 mod pace;
-mod plan;
 mod rate;
 mod requested;
 mod timing;
+mod wish;
 
 use std::time::{Duration, Instant};
 
-use tactomo_protocol::{Command, Fault, Hello, Plan, Request, Settings};
+use tactomo_protocol::{Command, Fault, Hello, Output, Plan, Request, Settings};
 
 use self::pace::Paces;
-use self::plan::PlanWish;
 use self::rate::{KEEP_ALIVE, Rates};
 use self::timing::Timing;
+use self::wish::Wish;
 
 pub use greet::{GreetError, explain, greet};
 pub use line::send;
-pub use plan::PlanState;
 pub use rate::RATES;
 pub use requested::{Refusal, RequestedSettings};
+pub use wish::WishState;
 
 /// Time between two askings for Hello.
 const ASK_EVERY: Duration = Duration::from_millis(250);
@@ -82,7 +82,9 @@ pub struct Session {
     settings_due: bool,
     /// Whether settings were sent of which nobody knows if they arrived.
     settings_in_doubt: bool,
-    plan: PlanWish,
+    plan: Wish<Plan>,
+    /// What the board sends; until it sends something else, what it does by itself.
+    output: Wish<Output>,
     /// The rate of the line; `None` where it has none, or before it is open.
     rates: Option<Rates>,
     /// Whether Start is to be sent.
@@ -112,7 +114,8 @@ impl Session {
             requested,
             settings_due: false,
             settings_in_doubt: false,
-            plan: PlanWish::default(),
+            plan: Wish::new(None),
+            output: Wish::new(Some(Output::Frames)),
             rates: None,
             start_due: false,
             hello: None,
@@ -137,17 +140,6 @@ impl Session {
         self.give_way(|command| matches!(command, Command::Configure(_)));
     }
 
-    /// Asks the board to scan other rows, or whole frames again; [`plan_state`](Self::plan_state) says what became of it. A board that starts
-    /// anew gets the plan again.
-    pub fn request_plan(&mut self, plan: Option<Plan>) {
-        self.plan.request(plan.unwrap_or_default());
-        self.paces.restart(&Command::Scan(Plan::default()));
-        if self.give_way(|command| matches!(command, Command::Scan(_))) {
-            // It may arrive all the same.
-            self.plan.forget();
-        }
-    }
-
     /// Whether a board has said who it is, by itself or in answer to what it was asked.
     pub fn knows_the_board(&self) -> bool {
         self.hello.is_some()
@@ -156,11 +148,6 @@ impl Session {
     /// Of a board that only answers what it was not asked, the command that it names, and the one that was sent.
     pub fn stray(&self) -> Option<(u8, u8)> {
         self.stray.filter(|_| self.hello.is_none()).map(|named| (named, self.tag))
-    }
-
-    /// What became of the plan that was [asked for](Self::request_plan) last: whole frames, if none was.
-    pub fn plan_state(&self) -> PlanState {
-        self.plan.state()
     }
 
     /// The settings that the board did not take, if there are such since the last [request](Self::request).
@@ -239,6 +226,7 @@ impl Session {
             self.rates.as_ref().and_then(Rates::due).map(|baud| Command::Rate { baud }),
             self.settings_due.then_some(Command::Configure(wanted)),
             self.plan.due().cloned().map(Command::Scan),
+            self.output.due().copied().map(Command::Output),
             self.start_due.then_some(Command::Start),
         ];
         let due = due.into_iter().flatten().find(|command| self.paces.allow(command, now));
@@ -297,7 +285,7 @@ impl Session {
         let is_followed = match &command {
             Command::Start | Command::Stop => hello.is_streaming,
             Command::Configure(wanted) => *wanted == hello.settings,
-            Command::Hello | Command::Scan(_) | Command::Rate { .. } => true,
+            Command::Hello | Command::Scan(_) | Command::Rate { .. } | Command::Output(_) | Command::Table(_) => true,
         };
         if is_followed {
             self.paces.restart(&command);
@@ -308,15 +296,16 @@ impl Session {
             Command::Start | Command::Stop => self.start_due = !is_followed,
             Command::Configure(_) if is_followed => self.settings_in_doubt = false,
             Command::Configure(wanted) => self.refused(wanted, true),
-            Command::Scan(plan) => self.plan.confirmed(plan),
-            Command::Rate { .. } => {}
+            Command::Scan(plan) => self.plan.set_in_force(Some(plan)),
+            Command::Output(output) => self.output.set_in_force(Some(output)),
+            Command::Rate { .. } | Command::Table(_) => {}
         }
     }
 
     /// The first answer of a board that may have been talked to before.
     fn greeted(&mut self, hello: &Hello, now: Instant) {
         self.start_due = !hello.is_streaming;
-        self.plan.forget();
+        self.plan.set_in_force(None);
         if hello.is_streaming {
             self.started = true;
             self.waiting_since.get_or_insert(now);
@@ -329,7 +318,8 @@ impl Session {
         self.pending = None;
         self.timing.restart();
         (self.settings_due, self.start_due) = (true, true);
-        self.plan.forget();
+        self.plan.set_in_force(None);
+        self.output.set_in_force(Some(Output::Frames));
         self.hello = Some(hello.clone());
     }
 
@@ -337,12 +327,14 @@ impl Session {
     pub fn fault(&mut self, fault: &Fault) -> bool {
         match *fault {
             Fault::BadSettings { answers } if self.is_answer(answers) => {}
-            Fault::BadPlan { answers } | Fault::BadRate { answers } if self.is_answer(answers) => {}
+            Fault::BadPlan { answers } | Fault::BadRate { answers } | Fault::NoTable { answers }
+                if self.is_answer(answers) => {}
             _ => return false,
         }
         match self.pending.take().map(|pending| pending.request.command) {
             Some(Command::Configure(wanted)) => self.refused(wanted, true),
             Some(Command::Scan(_)) => self.plan_refused("does not take"),
+            Some(Command::Output(_)) => self.output.refused(),
             Some(Command::Rate { .. }) => self.rates.iter_mut().for_each(Rates::refused),
             _ => return false,
         }
@@ -359,8 +351,9 @@ impl Session {
         match self.pending.take().map(|pending| pending.request.command) {
             Some(Command::Configure(wanted)) => self.refused(wanted, false),
             // Whole frames nobody has asked for; the frames themselves say what they are.
-            Some(Command::Scan(plan)) if plan.is_whole() => self.plan.confirmed(plan),
+            Some(Command::Scan(plan)) if plan.is_whole() => self.plan.set_in_force(Some(plan)),
             Some(Command::Scan(_)) => self.plan_refused("did not confirm"),
+            Some(Command::Output(_)) => self.output.refused(),
             Some(Command::Rate { .. }) => self.rates.iter_mut().for_each(Rates::refused),
             _ => self.start_due = false,
         }
@@ -375,20 +368,6 @@ impl Session {
         }
         self.requested = RequestedSettings::default();
         (self.settings_due, self.settings_in_doubt) = (false, false);
-    }
-
-    fn plan_refused(&mut self, how: &str) {
-        tracing::warn!("the board {how} the scan plan, and keeps the one before");
-        self.plan.refused();
-    }
-
-    /// Takes note of a frame.
-    pub fn frame(&mut self, now: Instant) {
-        self.whole(now);
-        if self.started {
-            self.heard = Some(now);
-            self.waiting_since = None;
-        }
     }
 
     /// Whether the board answers and sends no frames, although it was started, and asked again.

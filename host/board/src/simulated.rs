@@ -18,7 +18,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use tactomo_firmware::mux::{LatchLines, Latched, Transparent};
-use tactomo_firmware::{Activity, Adc, Board32, Identity, Mux, NewBoardError, Parts};
+use tactomo_firmware::{Activity, Adc, Board32, ContactFinder, Identity, Mux, NewBoardError, Parts, RamStore};
 
 use self::circuit::{Circuit, MuxLine, MuxPin, SimulatedChip};
 use self::line::{BoardEnd, Line};
@@ -29,6 +29,7 @@ use crate::link::{Control, ControlError, Link, Playing};
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::simulate::{Controls, Physics, Simulation};
+use tactomo_protocol::MAX_READINGS;
 
 /// How far the board's clock may run ahead within a frame before the thread sleeps.
 const AHEAD: Duration = Duration::from_millis(5);
@@ -43,7 +44,12 @@ const READ_WAIT: Duration = Duration::from_millis(50);
 /// Longest wait for room of one write.
 const WRITE_WAIT: Duration = Duration::from_secs(1);
 
-type SimulatedFirmware<M> = Board32<M, SimulatedSampler, BoardEnd, SimulatedChip>;
+/// Room for a table (bytes): that of a detector of 32 electrodes has 196 kB.
+const TABLE_BYTES: usize = 256 * 1024;
+
+/// Contacts that the board finds by itself, by a table in memory.
+type Finder = ContactFinder<RamStore<Vec<u8>>, MAX_READINGS>;
+type SimulatedFirmware<M> = Board32<M, SimulatedSampler, BoardEnd, SimulatedChip, Finder>;
 /// One step of the firmware, whatever its multiplexer.
 type Step = Box<dyn FnMut() -> Activity + Send>;
 
@@ -254,11 +260,12 @@ fn firmware(
     let chip = SimulatedChip::new(circuit);
     let pin = |line| MuxPin::new(circuit, line);
     let address = |bit| pin(MuxLine::Address(bit));
+    let touch = ContactFinder::new(RamStore::new(vec![0; TABLE_BYTES]));
     let made = match figures.wiring {
         // Five lines, as an ADG732 has them: 32 electrodes are the most that the protocol carries.
         Wiring::Transparent => {
             let mux = Transparent::new([0, 1, 2, 3, 4].map(address));
-            steps(Parts { mux, sampler, serial, chip }, identity)
+            steps(Parts { mux, sampler, serial, chip, touch }, identity)
         }
         Wiring::Latched => {
             let lines = LatchLines { wr: pin(MuxLine::Wr), csa: pin(MuxLine::Csa), csb: pin(MuxLine::Csb) };
@@ -266,14 +273,14 @@ fn firmware(
                 Ok(mux) => mux,
                 Err(never) => match never {},
             };
-            steps(Parts { mux, sampler, serial, chip }, identity)
+            steps(Parts { mux, sampler, serial, chip, touch }, identity)
         }
     };
     made.map_err(|source| SimulatedBoardError::Board { detector: detector.name.clone(), source })
 }
 
 fn steps<M>(
-    parts: Parts<M, SimulatedSampler, BoardEnd, SimulatedChip>,
+    parts: Parts<M, SimulatedSampler, BoardEnd, SimulatedChip, Finder>,
     identity: Identity,
 ) -> Result<Step, NewBoardError>
 where

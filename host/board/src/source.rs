@@ -44,6 +44,9 @@ pub enum SourceError {
     /// The recording.
     #[error(transparent)]
     Recording(#[from] RecordError),
+    /// A link that is open, and a board that could not be made ready.
+    #[error(transparent)]
+    Prepared(Box<dyn std::error::Error + Send + Sync>),
     /// A link that was opened before and cannot be opened again.
     #[error("{0} has ended")]
     Ended(String),

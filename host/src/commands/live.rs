@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tactomo::board::record::Header;
 use tactomo::board::session::RequestedSettings;
 use tactomo::board::source::Source;
@@ -18,6 +19,7 @@ use tactomo::run::Listener;
 use tactomo::run::calibration::Learning;
 use tactomo::run::options::{RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
+use tactomo::run::table::WithTable;
 use tactomo::scene::SceneName;
 use tactomo::sink::address::Address;
 use tactomo::sink::door::{Door, Origin};
@@ -29,6 +31,7 @@ use super::streams::StreamArgs;
 use super::{browser, keep};
 use tactomo_cli::choice::{DetectorArgs, Model};
 use tactomo_cli::output::message;
+use tactomo_protocol::Output;
 
 /// What `--simulate` is here, where there may be several.
 const SIMULATE: &str = "Uses the simulated board: the real firmware on simulated pins. With a number so many of them, each with a scene of its own";
@@ -48,6 +51,7 @@ const PORT: &str = "Serial port of the board, or the serial number of its USB de
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
 ///   tactomo live --learned mine.safetensors         by what presses on this sensor have taught
 ///   tactomo live --simulate --scan adaptive         the rows that a scene needs, as they come
+///   tactomo live --simulate --board-sends contacts  what the board finds by itself
 ///   tactomo live --replay touch.tactomo --speed 0.25
 ///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network
 ///   tactomo live --stream - --stream-hz 100 | python robot.py
@@ -77,6 +81,10 @@ pub struct Args {
     /// gives five times as many answers a second as whole frames on the ESP32's line; or a list of electrodes to ground, such as 0,5,10,15
     #[arg(long, value_name = "PLAN", default_value_t = ScanChoice::Whole, conflicts_with = "replay")]
     pub scan: ScanChoice,
+    /// What the board sends: `frames` of readings; the `contacts` that it finds in them by itself, up to three, by a table of the detector that it is given
+    /// first; or `both`
+    #[arg(long, value_name = "WHAT", default_value = "frames", value_parser = output(), conflicts_with = "replay")]
+    pub board_sends: Output,
     /// Ends this many seconds after the board said Hello
     #[arg(long, value_parser = source::seconds)]
     pub seconds: Option<Duration>,
@@ -148,6 +156,8 @@ pub struct Show {
     pub settings: RequestedSettings,
     /// Which rows the board is asked to scan.
     pub scan: ScanChoice,
+    /// What the board is asked to send.
+    pub output: Output,
     /// How the detector is learned, if it is; a recording is taken as it was.
     pub learning: Option<Learning>,
     /// Time from Hello to the end.
@@ -186,12 +196,17 @@ fn prepared(args: Args) -> anyhow::Result<Show> {
         Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &detector)?,
     };
+    let output = args.board_sends;
+    let source = if output.has_contacts() { Box::new(WithTable::new(source, detector.clone())) } else { source };
     let settings = args.board.settings.requested();
     let is_pointer = args.board.scene.scene == Some(SceneName::Pointer);
     let Args { mut picture, scan, seconds, record, streams, elf, .. } = args;
     scan.check(detector.electrodes.len()).map_err(|what| anyhow!("--scan {scan}: {what}"))?;
     picture.pointer |= is_pointer;
-    Ok(Show { source, finger, settings, scan, learning, detector, picture, seconds, record, streams, elf })
+    if output.has_contacts() {
+        picture.solver.get_or_insert(Method::Core);
+    }
+    Ok(Show { source, finger, settings, scan, output, learning, detector, picture, seconds, record, streams, elf })
 }
 
 /// How the detector is learned, if it is.
@@ -219,6 +234,15 @@ fn kept(learning: Option<&Learning>) -> Option<Detector> {
     kept.unwrap_or_else(|error| {
         message!("what was learned before cannot be used, so it is learned anew: {error}");
         None
+    })
+}
+
+/// What a board sends, by its name.
+fn output() -> impl TypedValueParser<Value = Output> {
+    PossibleValuesParser::new(["frames", "contacts", "both"]).map(|name| match &*name {
+        "contacts" => Output::Contacts,
+        "both" => Output::Both,
+        _ => Output::Frames,
     })
 }
 
@@ -255,6 +279,7 @@ fn options(
     Ok(RunOptions {
         settings: show.settings,
         scan: show.scan.clone(),
+        output: show.output,
         solving: Some(Solving { learning, ..Solving::new(method(&show.picture, &problem), problem) }),
         recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
         begin_recording: Some(keep::on_request(detector.clone(), show.source.name(), name)),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use tactomo::board::session::RequestedSettings;
 use tactomo::run::scanning::ScanChoice;
+use tactomo_protocol::Output;
 
 use super::live::{self, PictureArgs, Show};
 use super::source;
@@ -41,6 +42,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         finger: None,
         picture: args.picture,
         scan: ScanChoice::Whole,
+        output: Output::default(),
         learning: None,
         settings: RequestedSettings::default(),
         seconds: None,

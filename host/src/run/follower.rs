@@ -6,13 +6,13 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use tactomo_physics::detector::Detector;
-use tactomo_touch::solve::Parts;
+use tactomo_touch::solve::{Method, Parts};
 
 use super::Listener;
 use super::answers::Answers;
 use super::calibration::Calibration;
 use super::event::TouchEvent;
-use super::inbox::{Event, Inbox, Searched, Taken};
+use super::inbox::{Event, Found, Inbox, Searched, Taken};
 use super::notice::NoticeBoard;
 use super::options::{LiveError, Solving};
 use super::order::Made;
@@ -185,6 +185,13 @@ impl FollowLoop {
 
     fn frame(&mut self, frame: Taken) -> Result<(), LiveError> {
         let begun = Instant::now();
+        let method = self.solvers.method();
+        if let Some(found) = frame.found.clone().filter(|found| method == Method::Core || !found.has_readings) {
+            let Found { solution, is_taking_rest: is_taking_baseline, .. } = found;
+            let first = TouchEvent::new(frame.newest, frame.mean, solution);
+            self.answers.tell(TouchEvent { is_taking_baseline, ..first }, begun, frame.came);
+            return Ok(());
+        }
         let others_are_left_out = self.solvers.note(&frame);
         let Some(detector) = self.solvers.detector() else { return Ok(()) };
         let touch = detector.touch(&frame.mean);

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{AdaptiveMean, Hypothesis, Look, Method, Parts, Solver};
+use tactomo_touch::solve::{AdaptiveMean, Hypothesis, Look, Method, Parts, Solution, Solver};
 
 use super::calibration::messages::{Calibrate, Outcome};
 use super::frame::{Frame, Rows};
@@ -35,12 +35,25 @@ pub struct Taken {
     pub averaged: u32,
     /// Frames that came since the last one was taken, this one included.
     pub came: u32,
+    /// What the board has found in the newest, if it finds contacts itself.
+    pub found: Option<Found>,
+}
+
+/// What a board has found in a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Contacts and flags.
+    pub solution: Solution,
+    /// Whether readings at rest are still being taken.
+    pub is_taking_rest: bool,
+    /// Whether the readings came too.
+    pub has_readings: bool,
 }
 
 impl Taken {
     /// A frame by itself, and the rows that came in it.
-    pub fn new(frame: Frame, rows: Vec<Rows>) -> Self {
-        Self { mean: frame.used.clone(), newest: frame, rows, averaged: 1, came: 1 }
+    pub fn new(frame: Frame, rows: Vec<Rows>, found: Option<Found>) -> Self {
+        Self { mean: frame.used.clone(), newest: frame, rows, averaged: 1, came: 1, found }
     }
 }
 
@@ -204,6 +217,11 @@ impl Inbox {
 impl State {
     fn add(&mut self, mut frame: Taken, noise_v: f64) {
         let before = self.pending.take();
+        if frame.found.as_ref().is_some_and(|found| !found.has_readings) {
+            frame.came += before.map_or(0, |before| before.came);
+            (self.still, self.pending) = (None, Some(frame));
+            return;
+        }
         if !frame.rows.is_empty() {
             // Each row tells what is new in it: none is left out, but where a follower stands still for long.
             if let Some(before) = before {
@@ -238,7 +256,7 @@ mod tests {
     fn frame(volts: f64, sequence: u64) -> Taken {
         let readings = Readings::from_fn(4, |_, _| volts);
         let first = Frame::first(readings.clone(), readings, Arrival::at(Instant::now()));
-        Taken::new(Frame { sequence, ..first }, Vec::new())
+        Taken::new(Frame { sequence, ..first }, Vec::new(), None)
     }
 
     fn taken(inbox: &Inbox) -> Option<Taken> {

@@ -21,6 +21,7 @@ pub mod course;
 mod detector;
 mod event;
 mod follower;
+mod found;
 mod frame;
 mod inbox;
 mod maker;
@@ -35,6 +36,7 @@ pub mod scanning;
 mod searcher;
 mod solvers;
 mod statistics;
+pub mod table;
 mod wires;
 
 pub use self::event::{Listener, TouchEvent};

@@ -24,7 +24,7 @@ use tactomo_physics::readings::Readings;
 #[cfg(doc)]
 use tactomo_physics::scene::SceneName;
 use tactomo_physics::threads;
-use tactomo_protocol::Hello;
+use tactomo_protocol::{Hello, Output};
 use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
 use tactomo_touch::vibration::Peak;
 
@@ -47,6 +47,8 @@ pub struct RunOptions {
     pub settings: RequestedSettings,
     /// Which rows the board is asked to scan.
     pub scan: ScanChoice,
+    /// What the board is asked to send.
+    pub output: Output,
     /// What reads the touch; `None` only receives.
     pub solving: Option<Solving>,
     /// Keeps the bytes.
@@ -74,6 +76,7 @@ impl RunOptions {
             detector,
             settings: RequestedSettings::default(),
             scan: ScanChoice::default(),
+            output: Output::default(),
             solving: None,
             recorder: None,
             ring: None,
@@ -241,6 +244,14 @@ pub enum LiveError {
     /// The board has said Hello, and the time is over without a frame.
     #[error("{link}: {}", session::MUTE)]
     Mute {
+        /// Name of the link.
+        link: String,
+    },
+    /// It was asked for contacts and does not send them.
+    #[error(
+        "{link}: the board does not send contacts, though it was given a table: its firmware is older than this program; flash it with `tactomo board flash`"
+    )]
+    NoContacts {
         /// Name of the link.
         link: String,
     },

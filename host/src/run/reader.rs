@@ -12,16 +12,18 @@ use tactomo_board::link::{Control, Link, Playing};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::OtherProtocol;
 use tactomo_board::sequence::Sequence;
-use tactomo_board::session::{self, GreetError};
+use tactomo_board::session::{self, GreetError, WishState};
 use tactomo_board::source::Source;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::SceneName;
-use tactomo_protocol::{BoardMessage, DecodeError, Hello};
+use tactomo_protocol::{BoardMessage, Contacts, DecodeError, Hello, Output};
 
 use super::connection::Connection;
 use super::course::Course;
 use super::follower::FollowThread;
+use super::found;
 use super::frame::{Arrival, Frame, NewestReadings, Rows};
 use super::inbox::{Event, Inbox, Taken};
 use super::notice::NoticeBoard;
@@ -77,6 +79,7 @@ pub fn run(source: &mut dyn Source, mut options: RunOptions, ends: Ends) -> Resu
         scanned,
         newest: None,
         plans: PlanRequests::new(requested),
+        found: None,
     };
     let ended = reader.run(source);
     inbox.close();
@@ -140,6 +143,8 @@ struct Reader {
     newest: Option<[NewestReadings; 2]>,
     /// The scan plan that the follower requests, on its way to the board.
     plans: PlanRequests,
+    /// Contacts whose readings are still to come.
+    found: Option<Contacts>,
 }
 
 /// Who has said Hello, and what its frames mean.
@@ -194,6 +199,7 @@ impl Reader {
     fn serve(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
         let mut connection = Connection::new(self.options.settings, comes_back);
         self.plans.ask_again(&mut connection.session);
+        connection.session.request_output(self.options.output);
         let mut buffer = [0; READ_BYTES];
         self.sequence.restart();
         self.newest = None;
@@ -213,6 +219,9 @@ impl Reader {
                     self.receive(&mut connection, link, &buffer[..count])?;
                 }
                 Err(error) => return lost(link, error, comes_back),
+            }
+            if connection.session.output_state() == WishState::Refused {
+                return Err(LiveError::NoContacts { link: link.name() });
             }
             if comes_back && let Some(error) = connection.in_vain() {
                 return self.unanswered(error, link);
@@ -247,6 +256,8 @@ impl Reader {
             match message {
                 Ok(BoardMessage::Frame(frame)) => self.frame(connection, &frame, received),
                 Ok(BoardMessage::Hello(hello)) => self.hello(connection, hello, received)?,
+                Ok(BoardMessage::Contacts(contacts)) => self.contacts(connection, contacts, received),
+                Ok(BoardMessage::Table(_)) => {}
                 Ok(BoardMessage::Clock(clock)) => connection.session.clock(clock, received),
                 Ok(BoardMessage::Log(log)) => self.options.board_log.take(&log.0),
                 Ok(BoardMessage::Fault(fault)) => {
@@ -312,10 +323,13 @@ impl Reader {
     }
 
     fn frame(&mut self, connection: &mut Connection, frame: &tactomo_protocol::Frame, received: Instant) {
-        // Before Hello nobody knows what the readings mean.
-        let (Some(board), Some(_)) = (&self.board, connection.junk) else { return };
         connection.session.frame(received);
         connection.landed();
+        // Before Hello nobody knows what the readings mean.
+        let (Some(board), Some(_)) = (&self.board, connection.junk) else { return };
+        if !self.options.output.has_frames() {
+            return;
+        }
         let Some(measured) = board.volts.measured(frame) else {
             return self.notice.count(|meter| meter.corrupt(1));
         };
@@ -326,6 +340,8 @@ impl Reader {
         if !self.follows {
             return;
         }
+        let is_its = |contacts: &mut Contacts| contacts.head.sequence == frame.head.sequence;
+        let found = self.found.take_if(is_its).map(|contacts| found::found(&contacts, true));
         let used = board.volts.used(measured.clone());
         let (measured, used, rows) = match frame.scope.is_whole() {
             true => {
@@ -343,8 +359,44 @@ impl Reader {
         let (sequence, board_time_us, arrived) = (place.sequence, place.time_us, Arrival::at(received));
         let delay = connection.session.delay(frame.head.time_us, received);
         let (status, lost) = (frame.head.status, self.frames_lost);
-        let taken = Taken::new(Frame { sequence, board_time_us, arrived, delay, status, lost, measured, used }, rows);
-        self.inbox.put_frame(taken, board.noise_v);
+        let frame = Frame { sequence, board_time_us, arrived, delay, status, lost, measured, used };
+        self.inbox.put_frame(Taken::new(frame, rows, found), board.noise_v);
+    }
+
+    /// Takes contacts that the board has found; where their readings come too, these bring them along.
+    fn contacts(&mut self, connection: &mut Connection, contacts: Contacts, received: Instant) {
+        connection.session.contacts(received);
+        connection.landed();
+        match self.options.output {
+            Output::Contacts => self.contacts_alone(connection, &contacts, received),
+            Output::Frames if connection.answers => {}
+            // Of a recording nobody knows whether readings follow before something else does.
+            Output::Frames | Output::Both => {
+                let before = self.found.replace(contacts);
+                before.into_iter().for_each(|before| self.contacts_alone(connection, &before, received));
+            }
+        }
+    }
+
+    fn contacts_alone(&mut self, connection: &mut Connection, contacts: &Contacts, received: Instant) {
+        let (Some(board), Some(_)) = (&self.board, connection.junk) else { return };
+        let place = self.sequence.place(&contacts.head);
+        self.frames_lost += place.dropped;
+        self.notice.count(|meter| meter.frame(received, &contacts.head, place.dropped));
+        if !self.follows {
+            return;
+        }
+        let nothing = Readings::from_fn(board.hello.electrodes.into(), |_, _| 0.0).hiding(|_, _| true);
+        let first = Frame::first(nothing.clone(), nothing, Arrival::at(received));
+        let frame = Frame {
+            sequence: place.sequence,
+            board_time_us: place.time_us,
+            delay: connection.session.delay(contacts.head.time_us, received),
+            status: contacts.head.status,
+            lost: self.frames_lost,
+            ..first
+        };
+        self.inbox.put_frame(Taken::new(frame, Vec::new(), Some(found::found(contacts, false))), board.noise_v);
     }
 
     fn is_timed_out(&self) -> bool {

@@ -57,7 +57,7 @@ impl FakeBoard {
 
     fn obey(&mut self, tag: u8, command: Command) {
         match command {
-            Command::Hello | Command::Scan(_) | Command::Rate { .. } => {}
+            Command::Hello | Command::Scan(_) | Command::Rate { .. } | Command::Output(_) | Command::Table(_) => {}
             Command::Configure(settings) => self.settings = settings,
             Command::Start => self.streaming = true,
             Command::Stop => self.streaming = false,

@@ -3,9 +3,9 @@
 use heapless::Vec as Fixed;
 use proptest::prelude::*;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Clock, Command, CommandReceiver, ConverterErrors, Counters, DecodeError, Fault, Frame,
-    FrameHead, Hello, Log, MAX_COMMAND, MAX_WIRE, Plan, Range, Request, Scope, Settings, Status, encode_board,
-    encode_request,
+    BoardMessage, BoardReceiver, Clock, Command, CommandReceiver, ContactCode, ContactFlags, Contacts, ConverterErrors,
+    Counters, DecodeError, Fault, Frame, FrameHead, Hello, Log, MAX_COMMAND, MAX_WIRE, Output, Plan, Range, Request,
+    Scope, Settings, Status, TableId, TablePiece, TableState, encode_board, encode_request,
 };
 
 /// A text of up to `N` bytes, not all of them ASCII.
@@ -88,21 +88,24 @@ pub fn scope() -> impl Strategy<Value = Scope> {
     prop_oneof![(4..=32u8).prop_map(|n| Scope::whole(n).expect("4 to 32")), some]
 }
 
-fn frame() -> impl Strategy<Value = BoardMessage> {
+fn head() -> impl Strategy<Value = FrameHead> {
     let head = (any::<u16>(), any::<u32>(), 0..=3u8, 0..=15u8, 0..=15u8);
-    let head = head.prop_map(|(sequence, time_us, status, folded, fraction_bits)| FrameHead {
+    head.prop_map(|(sequence, time_us, status, folded, fraction_bits)| FrameHead {
         sequence,
         time_us,
         status: Status(status),
         folded,
         fraction_bits,
-    });
+    })
+}
+
+fn frame() -> impl Strategy<Value = BoardMessage> {
     let readings = (scope(), 0..=16u32).prop_flat_map(|(scope, bits)| {
         let largest = ((1u32 << bits) - 1) as u16;
         let readings = prop::collection::vec(prop_oneof![Just(0), 0..=largest], scope.readings());
         (Just(scope), readings)
     });
-    (head, readings).prop_map(|(head, (scope, readings))| {
+    (head(), readings).prop_map(|(head, (scope, readings))| {
         let readings = Fixed::from_slice(&readings).expect("room for 32 x 32");
         BoardMessage::Frame(Frame { head, scope, readings })
     })
@@ -122,6 +125,7 @@ fn fault() -> impl Strategy<Value = BoardMessage> {
         any::<u8>().prop_map(|answers| Fault::BadSettings { answers }),
         any::<u8>().prop_map(|answers| Fault::BadPlan { answers }),
         any::<u8>().prop_map(|answers| Fault::BadRate { answers }),
+        any::<u8>().prop_map(|answers| Fault::NoTable { answers }),
         any::<u8>().prop_map(Fault::UnknownVersion),
     ]
     .prop_map(BoardMessage::Fault)
@@ -131,8 +135,29 @@ fn clock() -> impl Strategy<Value = BoardMessage> {
     (any::<u8>(), any::<u32>()).prop_map(|(answers, time_us)| BoardMessage::Clock(Clock { answers, time_us }))
 }
 
+fn contacts() -> impl Strategy<Value = BoardMessage> {
+    let contact = (any::<u8>(), any::<[i16; 2]>(), any::<u16>(), any::<u8>());
+    let contact = contact.prop_map(|(id, at, conductance, sigma)| ContactCode { id, at, conductance, sigma });
+    let all = [ContactFlags::MORE, ContactFlags::MISFIT, ContactFlags::SATURATED, ContactFlags::RESTING];
+    let flags = prop::sample::subsequence(all.to_vec(), 0..=4).prop_map(|raised| {
+        let mut flags = ContactFlags::default();
+        raised.into_iter().for_each(|flag| flags.raise(flag));
+        flags
+    });
+    (head(), flags, prop::collection::vec(contact, 0..=3)).prop_map(|(head, flags, found)| {
+        let head = FrameHead { fraction_bits: 0, ..head };
+        BoardMessage::Contacts(Contacts { head, flags, found: found.into_iter().collect() })
+    })
+}
+
+fn table() -> impl Strategy<Value = BoardMessage> {
+    let id = (any::<u32>(), any::<u32>()).prop_map(|(layout, checksum)| TableId { layout, checksum });
+    (any::<u8>(), any::<u32>(), any::<u32>(), prop::option::of(id))
+        .prop_map(|(answers, room, held, usable)| BoardMessage::Table(TableState { answers, room, held, usable }))
+}
+
 pub fn board_message() -> impl Strategy<Value = BoardMessage> {
-    prop_oneof![any_hello(), frame(), log(), fault(), clock()]
+    prop_oneof![any_hello(), frame(), log(), fault(), clock(), contacts(), table()]
 }
 
 /// Any plan that the wire carries, whether or not a board would take it.
@@ -155,6 +180,9 @@ pub fn request() -> impl Strategy<Value = Request> {
         settings().prop_map(Command::Configure),
         plan().prop_map(Command::Scan),
         any::<u32>().prop_map(|baud| Command::Rate { baud }),
+        prop_oneof![Just(Output::Frames), Just(Output::Contacts), Just(Output::Both)].prop_map(Command::Output),
+        (any::<u32>(), prop::collection::vec(any::<u8>(), 0..=64))
+            .prop_map(|(at, bytes)| { Command::Table(TablePiece { at, bytes: bytes.into_iter().collect() }) }),
     ];
     (1u8.., command).prop_map(|(tag, command)| Request { tag, command })
 }

@@ -6,8 +6,9 @@ use std::fmt::Debug;
 
 use heapless::Vec as Fixed;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Clock, Command, DecodeError, Fault, Frame, FrameHead, Keys, Log, MAX_WIRE, Plan,
-    Request, Scope, Settings, Status, encode_keyed,
+    BoardMessage, BoardReceiver, Clock, Command, ContactCode, ContactFlags, Contacts, DecodeError, Fault, Frame,
+    FrameHead, Keys, Log, MAX_WIRE, Output, Plan, Request, Scope, Settings, Status, TableId, TablePiece, TableState,
+    encode_keyed,
 };
 
 use crate::common::{board_wire, hello, packet, receive_command, request_wire};
@@ -60,7 +61,25 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Fault(Fault::BadPlan { answers: 9 }),
         BoardMessage::Fault(Fault::BadRate { answers: 13 }),
         BoardMessage::Clock(Clock { answers: 7, time_us: 67_305_985 }),
+        BoardMessage::Fault(Fault::NoTable { answers: 14 }),
+        contacts(head),
+        BoardMessage::Table(TableState { answers: 15, room: 0, held: 0, usable: None }),
+        BoardMessage::Table(TableState {
+            answers: 15,
+            room: 131_072,
+            held: 106_000,
+            usable: Some(TableId { layout: 0x0403_0201, checksum: 0xC0DE_CAFE }),
+        }),
     ]
+}
+
+/// Two contacts, the second of which the readings do not place.
+fn contacts(head: FrameHead) -> BoardMessage {
+    let mut flags = ContactFlags::default();
+    flags.raise(ContactFlags::MORE);
+    let found =
+        [ContactCode::new(7, [0.012_34, -0.02], 2e-4, 1e-4), ContactCode::new(8, [0.0, 0.03], 5e-5, f32::INFINITY)];
+    BoardMessage::Contacts(Contacts { head, flags, found: found.into_iter().collect() })
 }
 
 fn requests() -> Vec<Request> {
@@ -75,6 +94,8 @@ fn requests() -> Vec<Request> {
         Command::Scan(plan),
         Command::Scan(Plan::default()),
         Command::Rate { baud: 3_000_000 },
+        Command::Output(Output::Contacts),
+        Command::Table(TablePiece { at: 300, bytes: [1, 0, 2].into_iter().collect() }),
     ];
     (7..).zip(commands).map(|(tag, command)| Request { tag, command }).collect()
 }

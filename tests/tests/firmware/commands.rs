@@ -1,7 +1,7 @@
 //! The command loop: commands good and bad, the frame-rate cap, what is told after a reset.
 
 use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Activity, Adc, Board16, Identity, NewBoardError, Parts};
+use tactomo_firmware::{Activity, Adc, Board16, Identity, NewBoardError, NoTouch, Parts};
 use tactomo_protocol::{
     Command, ConverterErrors, Fault, Hello, MAX_COMMAND, Plan, Range, Request, Settings, VERSION, encode_request,
 };
@@ -109,7 +109,7 @@ fn a_hello_with_four_ranges_and_the_longest_values_is_sent_whole() {
     let name = "123456789012345678901234";
     let identity = Identity { firmware_version: name, board: name, electrodes: 16, adc, drive_mv: u16::MAX };
     let outside = Outside::default();
-    let parts = Parts { mux: NoMux, sampler: NullPart, serial: serial(&outside), chip: NullPart };
+    let parts = Parts { mux: NoMux, sampler: NullPart, serial: serial(&outside), chip: NullPart, touch: NoTouch };
     let mut board = Board16::new(parts, identity).unwrap();
     let settings = Settings {
         settle_us: u16::MAX,
@@ -269,7 +269,7 @@ fn a_fault_before_the_reset_is_told_at_once_and_to_the_first_host_that_asks() {
 #[test]
 fn an_identity_that_does_not_fit_is_refused() {
     let new = |identity| {
-        let parts = Parts { mux: NoMux, sampler: NullPart, serial: NullPart, chip: NullPart };
+        let parts = Parts { mux: NoMux, sampler: NullPart, serial: NullPart, chip: NullPart, touch: NoTouch };
         Board16::new(parts, identity).err()
     };
     assert_eq!(new(IDENTITY), None);

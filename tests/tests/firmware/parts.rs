@@ -7,7 +7,7 @@ use std::rc::Rc;
 use embedded_hal::delay::DelayNs;
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo_firmware::mux::Mux;
-use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Parts, Sampler, Serial, TimedOut};
+use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, NoTouch, Parts, Sampler, Serial, TimedOut};
 use tactomo_protocol::{
     BoardMessage, BoardReceiver, Command, Fault, Frame, Hello, MAX_COMMAND, Request, encode_request,
 };
@@ -230,6 +230,7 @@ where
         sampler: TestSampler(outside.clone(), sample),
         serial: TestSerial(outside.clone()),
         chip: TestChip(outside.clone(), delay),
+        touch: NoTouch,
     };
     Board16::new(parts, IDENTITY).unwrap()
 }

@@ -1,6 +1,6 @@
 //! Scan plans: which rows a board scans, and what its frames say of them.
 
-use tactomo_firmware::{Activity, Adc, Board16, Identity, Parts};
+use tactomo_firmware::{Activity, Adc, Board16, Identity, NoTouch, Parts};
 use tactomo_protocol::{Command, Fault, Plan, Range, Scope, Settings, Status};
 
 use super::parts::*;
@@ -159,7 +159,13 @@ fn the_last_range_is_stretched_over_the_electrodes_that_are_left() {
     });
     let identity = Identity { adc: Adc::new(12, 4096).with_ranges(&ranges), ..IDENTITY };
     let sample = |_, electrode: u8| Ok(if electrode == 15 { 2500 } else { 0 });
-    let parts = Parts { mux: NoMux, sampler: sampler(&outside, sample), serial: serial(&outside), chip: NullPart };
+    let parts = Parts {
+        mux: NoMux,
+        sampler: sampler(&outside, sample),
+        serial: serial(&outside),
+        chip: NullPart,
+        touch: NoTouch,
+    };
     let mut board = Board16::new(parts, identity).unwrap();
     outside.send(Command::Start);
     while board.step().unwrap() != Activity::Frame {}
@@ -187,7 +193,13 @@ fn every_electrode_saturates_where_its_own_converter_does() {
             _ => 0,
         })
     };
-    let parts = Parts { mux: NoMux, sampler: sampler(&outside, sample), serial: serial(&outside), chip: NullPart };
+    let parts = Parts {
+        mux: NoMux,
+        sampler: sampler(&outside, sample),
+        serial: serial(&outside),
+        chip: NullPart,
+        touch: NoTouch,
+    };
     let mut board = Board16::new(parts, identity).unwrap();
     outside.send(Command::Start);
     let mut scanned = 0;

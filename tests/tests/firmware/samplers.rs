@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use tactomo_firmware::{Activity, Board16, ConverterPair, Parts, Row, Sampler, SideBySide, TimedOut};
+use tactomo_firmware::{Activity, Board16, ConverterPair, NoTouch, Parts, Row, Sampler, SideBySide, TimedOut};
 use tactomo_protocol::{Command, Fault, Plan, Settings, Status};
 
 use super::parts::*;
@@ -11,7 +11,8 @@ use super::parts::*;
 type Record = Rc<RefCell<Vec<String>>>;
 
 fn board_with<S: Sampler>(outside: &Outside, sampler: S) -> Board16<NoMux, S, TestSerial, NullPart> {
-    Board16::new(Parts { mux: NoMux, sampler, serial: serial(outside), chip: NullPart }, IDENTITY).unwrap()
+    Board16::new(Parts { mux: NoMux, sampler, serial: serial(outside), chip: NullPart, touch: NoTouch }, IDENTITY)
+        .unwrap()
 }
 
 fn scan_with<S: Sampler>(board: &mut Board16<NoMux, S, TestSerial, NullPart>, frames: usize) {

@@ -15,7 +15,7 @@ use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use tactomo_board_common::WATCHDOG_TIMEOUT_MS;
 use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Board16, Identity, Parts};
+use tactomo_firmware::{Board16, Identity, NoTouch, Parts};
 
 use crate::chip::{StmChip, boot_fault};
 use crate::inputs::{ELECTRODES, Inputs};
@@ -62,7 +62,7 @@ fn main() -> ! {
     let mut watchdog = IndependentWatchdog::new(device.IWDG);
     watchdog.start(WATCHDOG_TIMEOUT_MS.millis());
     let parts =
-        Parts { mux: Transparent::new(address), sampler: inputs, serial, chip: StmChip::new(delay, counter, watchdog) };
+        Parts { mux: Transparent::new(address), sampler: inputs, serial, chip: StmChip::new(delay, counter, watchdog), touch: NoTouch };
     let identity = Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),
         board: "stm32f405",

@@ -15,7 +15,7 @@ use core::panic::PanicInfo;
 
 use embedded_hal::delay::DelayNs;
 use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Parts, Serial, log};
+use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, NoTouch, Parts, Serial, log};
 use tactomo_protocol::{Command, Fault, MAX_COMMAND, Request as HostRequest, encode_request};
 
 use crate::detector::{AddressLine, TableSampler, address_lines};
@@ -49,6 +49,7 @@ fn main() -> ! {
         sampler: TableSampler::new(&levels, &gauge, request == Request::Measure),
         serial: Line::new(request),
         chip: VirtChip(&gauge),
+        touch: NoTouch,
     };
     let mut board = match VirtBoard::new(parts, IDENTITY) {
         Ok(board) => board,

@@ -204,7 +204,8 @@ impl Listening {
                     }
                 }
                 Err(DecodeError::Version(found)) => return Err(version(&*self.link, found)),
-                Ok(BoardMessage::Log(_) | BoardMessage::Clock(_)) | Err(_) => {}
+                Ok(BoardMessage::Contacts(_)) => self.session.contacts(Instant::now()),
+                Ok(BoardMessage::Log(_) | BoardMessage::Clock(_) | BoardMessage::Table(_)) | Err(_) => {}
             }
         }
         Ok(())

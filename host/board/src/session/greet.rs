@@ -82,6 +82,9 @@ pub fn explain(fault: &Fault) -> String {
         Fault::BadRate { .. } => {
             "its line cannot be set to the rate that was asked for, and keeps the old one".to_owned()
         }
+        Fault::NoTable { .. } => {
+            "it has no table to find contacts by, or cannot take this one: `tactomo board table` sends one".to_owned()
+        }
         Fault::UnknownVersion(version) => format!("it got a command in version {version} of the protocol"),
     }
 }

@@ -9,11 +9,12 @@ const FIRST_PAUSE: Duration = Duration::from_millis(500);
 /// Doublings of the pause: 4 s at most.
 const MOST_DOUBLINGS: u32 = 3;
 
-/// The pauses of settings, plans and Start, each by itself: one that is not followed does not hold up the others.
+/// The pauses of settings, plans, outputs and Start, each by itself: one that is not followed does not hold up the others.
 #[derive(Debug, Default)]
 pub(super) struct Paces {
     settings: Pace,
     plan: Pace,
+    output: Pace,
     start: Pace,
 }
 
@@ -51,8 +52,9 @@ impl Paces {
         match command {
             Command::Configure(_) => Some(&mut self.settings),
             Command::Scan(_) => Some(&mut self.plan),
+            Command::Output(_) => Some(&mut self.output),
             Command::Start | Command::Stop => Some(&mut self.start),
-            Command::Hello | Command::Rate { .. } => None,
+            Command::Hello | Command::Rate { .. } | Command::Table(_) => None,
         }
     }
 }

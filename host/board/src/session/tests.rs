@@ -154,7 +154,7 @@ fn a_board_that_restarts_gets_everything_again() {
     session.request_plan(Some(four_rows()));
     let (tag, _) = said(&mut session, now).unwrap();
     session.hello(&hello(tag, with_settle(50), true), now);
-    assert_eq!((session.plan_state(), said(&mut session, now)), (PlanState::InForce, None));
+    assert_eq!((session.plan_state(), said(&mut session, now)), (WishState::InForce, None));
     // It says so, or only answers a question in a way that shows it.
     for answers in [0, 1] {
         let mut at = now;
@@ -166,14 +166,14 @@ fn a_board_that_restarts_gets_everything_again() {
             answers = tag;
         }
         session.hello(&hello(answers, Settings::default(), false), at);
-        assert_eq!(session.plan_state(), PlanState::Pending);
+        assert_eq!(session.plan_state(), WishState::Pending);
         let expected = [Command::Configure(with_settle(50)), Command::Scan(four_rows()), Command::Start];
         for expected in expected {
             let (tag, command) = said(&mut session, at).unwrap();
             assert_eq!(command, expected);
             session.hello(&hello(tag, with_settle(50), command == Command::Start), at);
         }
-        assert_eq!(session.plan_state(), PlanState::InForce);
+        assert_eq!(session.plan_state(), WishState::InForce);
     }
 }
 
@@ -181,13 +181,13 @@ fn a_board_that_restarts_gets_everything_again() {
 fn a_plan_is_taken_or_refused_or_never_answered() {
     let now = Instant::now();
     let mut session = streaming(RequestedSettings::default(), now);
-    assert_eq!(session.plan_state(), PlanState::InForce, "whole frames");
+    assert_eq!(session.plan_state(), WishState::InForce, "whole frames");
     session.request_plan(Some(four_rows()));
-    assert_eq!(session.plan_state(), PlanState::Pending);
+    assert_eq!(session.plan_state(), WishState::Pending);
     let (tag, command) = said(&mut session, now).unwrap();
     assert_eq!(command, Command::Scan(four_rows()));
     assert!(!session.fault(&Fault::BadPlan { answers: tag + 1 }) && session.fault(&Fault::BadPlan { answers: tag }));
-    assert_eq!((session.plan_state(), said(&mut session, now)), (PlanState::Refused, None));
+    assert_eq!((session.plan_state(), said(&mut session, now)), (WishState::Refused, None));
     // One whose answer is lost may be in force, so whole frames have to be asked for.
     session.request_plan(Some(four_rows()));
     said(&mut session, now).unwrap();
@@ -195,12 +195,34 @@ fn a_plan_is_taken_or_refused_or_never_answered() {
     let (tag, command) = said(&mut session, now).unwrap();
     assert_eq!(command, Command::Scan(Plan::default()));
     session.hello(&hello(tag, Settings::default(), true), now);
-    assert_eq!((session.plan_state(), said(&mut session, now)), (PlanState::InForce, None));
+    assert_eq!((session.plan_state(), said(&mut session, now)), (WishState::InForce, None));
     // One that is never answered.
     session.request_plan(Some(four_rows()));
     let steps = (0..100).map(|step| now + REPEAT_EVERY * step / 4);
     let sent = steps.filter(|at| self::command(&mut session, *at) == Some(Command::Scan(four_rows()))).count();
-    assert_eq!((sent, session.plan_state()), (TRIES as usize, PlanState::Refused));
+    assert_eq!((sent, session.plan_state()), (TRIES as usize, WishState::Refused));
+}
+
+#[test]
+fn contacts_are_asked_for_and_a_board_that_another_host_has_left_sending_them_is_asked_for_frames() {
+    let now = Instant::now();
+    let mut session = streaming(RequestedSettings::default(), now);
+    assert_eq!(
+        (session.output_state(), said(&mut session, now)),
+        (WishState::InForce, None),
+        "nothing is said of frames"
+    );
+    session.contacts(now);
+    let (tag, command) = said(&mut session, now).unwrap();
+    assert_eq!(command, Command::Output(Output::Frames));
+    session.hello(&hello(tag, Settings::default(), true), now);
+    session.frame(now);
+    assert_eq!((session.output_state(), said(&mut session, now)), (WishState::InForce, None));
+    session.request_output(Output::Contacts);
+    let (tag, command) = said(&mut session, now).unwrap();
+    assert_eq!((command, session.output_state()), (Command::Output(Output::Contacts), WishState::Pending));
+    assert!(session.fault(&Fault::NoTable { answers: tag }));
+    assert_eq!((session.output_state(), said(&mut session, now)), (WishState::Refused, None));
 }
 
 /// A board that answers each command at once in its own way, for so long in steps of a millisecond: how many commands it got.
@@ -254,7 +276,7 @@ fn a_plan_that_is_refused_holds_up_no_start_and_another_one_is_sent_at_once() {
         assert!(session.fault(&Fault::BadPlan { answers: tag }));
     }
     let (tag, command) = said(&mut session, now).unwrap();
-    assert_eq!((command, session.plan_state()), (Command::Start, PlanState::Refused));
+    assert_eq!((command, session.plan_state()), (Command::Start, WishState::Refused));
     session.hello(&hello(tag, Settings::default(), true), now);
     session.request_plan(Some(four_rows()));
     assert_eq!(self::command(&mut session, now), Some(Command::Scan(four_rows())));

@@ -13,7 +13,7 @@ use super::Args;
 /// Options of the program as a whole, which a patch has none of.
 const OF_ALL: [&str; 7] = ["skin", "http-port", "listen", "allow-origin", "no-open", "json", "seconds"];
 /// Arguments of one board, which patches have in place of the command line; `simulated` are those of scenes.
-pub const OF_ONE: [&str; 22] = [
+pub const OF_ONE: [&str; 23] = [
     "port",
     "simulate",
     "baud",
@@ -31,6 +31,7 @@ pub const OF_ONE: [&str; 22] = [
     "no_learning",
     "pointer",
     "scan",
+    "board_sends",
     "elf",
     "board",
     "time_factor",

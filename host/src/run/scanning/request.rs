@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use tactomo_board::session::{PlanState, Session};
+use tactomo_board::session::{Session, WishState};
 use tactomo_protocol::Plan;
 
 /// The plan that is wanted, on its way from the follower to the reader.
@@ -54,7 +54,7 @@ impl PlanRequests {
             session.request_plan(Some(plan.clone()));
             self.plan = Some(plan);
         }
-        let is_refused = self.plan.is_some() && session.plan_state() == PlanState::Refused;
+        let is_refused = self.plan.is_some() && session.plan_state() == WishState::Refused;
         if is_refused && !self.is_refused {
             tracing::warn!("the board does not take the scan plan, so it goes on with whole frames");
         }

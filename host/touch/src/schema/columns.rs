@@ -167,7 +167,8 @@ fn way_m(contact: &FoundContact, axis: usize) -> Option<f64> {
 }
 
 fn error(contact: &FoundContact, of: fn(&Uncertainty) -> f64) -> Option<f64> {
-    contact.uncertainty.as_ref().map(of)
+    // A board tells the error of the place alone.
+    contact.uncertainty.as_ref().map(of).filter(|error| !error.is_nan())
 }
 
 impl ContactColumn {

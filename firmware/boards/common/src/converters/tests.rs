@@ -9,7 +9,7 @@ use std::vec::Vec;
 
 use embedded_hal::delay::DelayNs;
 use tactomo_firmware::{
-    Activity, Adc, Board16, Chip, ConverterPair, Identity, Mux, Parts, Serial, SideBySide, TimedOut,
+    Activity, Adc, Board16, Chip, ConverterPair, Identity, Mux, NoTouch, Parts, Serial, SideBySide, TimedOut,
 };
 use tactomo_protocol::{
     BoardMessage, BoardReceiver, Command, Fault, Frame, MAX_COMMAND, Request, Settings, Status, encode_request,
@@ -154,6 +154,7 @@ fn board(state: &Rc<State>, settings: Settings) -> (FakeBoard, Rc<core::cell::Re
         sampler: SideBySide::new(converters(state), ESP32_ELECTRODES[0]),
         serial: line,
         chip: FakeChip(Rc::clone(state)),
+        touch: NoTouch,
     };
     let identity =
         Identity { firmware_version: "0", board: "esp32", electrodes: 16, adc: Adc::new(12, 4096), drive_mv: 2000 };

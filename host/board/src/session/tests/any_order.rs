@@ -10,6 +10,7 @@ use super::*;
 struct Board {
     settings: Settings,
     plan: Plan,
+    output: Output,
     streaming: bool,
     /// Messages on their way, and when they arrive (steps).
     line: VecDeque<(u64, Hello)>,
@@ -18,7 +19,7 @@ struct Board {
 impl Board {
     fn new() -> Self {
         let (settings, plan) = (Settings::default(), Plan::default());
-        Self { settings, plan, streaming: false, line: VecDeque::new() }
+        Self { settings, plan, output: Output::Frames, streaming: false, line: VecDeque::new() }
     }
 
     fn restart(&mut self) {
@@ -33,9 +34,10 @@ impl Board {
 
     fn obey(&mut self, request: Request, at: u64) {
         match request.command {
-            Command::Hello | Command::Rate { .. } => {}
+            Command::Hello | Command::Rate { .. } | Command::Table(_) => {}
             Command::Configure(settings) => self.settings = settings,
             Command::Scan(plan) => self.plan = plan,
+            Command::Output(output) => self.output = output,
             Command::Start => self.streaming = true,
             Command::Stop => self.streaming = false,
         }
@@ -55,6 +57,7 @@ enum Event {
     Dumb,
     Request(RequestedSettings),
     Plan(bool),
+    Output(Output),
 }
 
 fn any_request() -> impl Strategy<Value = RequestedSettings> {
@@ -73,6 +76,7 @@ fn any_event() -> impl Strategy<Value = Event> {
         1 => Just(Event::Dumb),
         1 => any_request().prop_map(Event::Request),
         1 => any::<bool>().prop_map(Event::Plan),
+        1 => prop_oneof![Just(Output::Frames), Just(Output::Contacts), Just(Output::Both)].prop_map(Event::Output),
     ]
 }
 
@@ -88,7 +92,7 @@ proptest! {
     ) {
         let begin = Instant::now();
         let (mut session, mut board, mut wanted) = (Session::new(first), Board::new(), first);
-        let mut plan = Plan::default();
+        let (mut plan, mut output) = (Plan::default(), Output::Frames);
         board.say_hello(0, 0);
         let mut deaf = false;
         for step in 0..460u64 {
@@ -115,6 +119,10 @@ proptest! {
                     plan = if *rows { four_rows() } else { Plan::default() };
                     session.request_plan(Some(plan.clone()));
                 }
+                Event::Output(other) => {
+                    output = *other;
+                    session.request_output(output);
+                }
             }
             while board.line.front().is_some_and(|(at, _)| *at <= step) {
                 let (_, hello) = board.line.pop_front().unwrap();
@@ -123,15 +131,19 @@ proptest! {
             if let Some(command) = session.command(now) && !std::mem::take(&mut deaf) {
                 board.obey(command, step + delays[step as usize]);
             }
-            if board.streaming {
+            if board.streaming && board.output.has_contacts() {
+                session.contacts(now);
+            }
+            if board.streaming && board.output.has_frames() {
                 session.frame(now);
             }
             prop_assert_eq!(session.refusal(), None, "step {}", step);
         }
         prop_assert_eq!(board.settings, wanted.over(board.settings));
         prop_assert!(board.streaming);
-        prop_assert_eq!(session.plan_state(), PlanState::InForce);
+        prop_assert_eq!(session.plan_state(), WishState::InForce);
         prop_assert_eq!(board.plan, plan);
+        prop_assert_eq!((board.output, session.output_state()), (output, WishState::InForce));
         let now = begin + Duration::from_millis(20 * 460);
         prop_assert!(!session.is_mute(now));
     }

@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use embedded_hal::delay::DelayNs;
 use proptest::prelude::*;
-use tactomo_firmware::{Adc, Board16, Chip, Identity, Mux, Parts, Sampler, Serial, TimedOut};
+use tactomo_firmware::{Adc, Board16, Chip, Identity, Mux, NoTouch, Parts, Sampler, Serial, TimedOut};
 use tactomo_protocol::{BoardMessage, BoardReceiver, MAX_COMMAND, encode_request};
 
 use super::*;
@@ -142,7 +142,7 @@ impl Pair {
             empty_us: 0.0,
         }));
         let part = || Part(Rc::clone(&wire));
-        let parts = Parts { mux: part(), sampler: part(), serial: part(), chip: part() };
+        let parts = Parts { mux: part(), sampler: part(), serial: part(), chip: part(), touch: NoTouch };
         let identity =
             Identity { firmware_version: "1", board: "test", electrodes: 4, adc: Adc::new(12, 3300), drive_mv: 2000 };
         let board = TestBoard::new(parts, identity).unwrap();

@@ -1,0 +1,167 @@
+//! Finds contacts in frames, by a table.
+
+use tactomo_protocol::scope::Scope;
+use tactomo_protocol::{
+    ContactCode, ContactFlags, Contacts, FrameHead, Hello, Output, TableId, TablePiece, TableState,
+};
+use tactomo_touch_core::{Answer, Contact, Flags, Solver, Table};
+
+use super::cells::Cells;
+use super::input::Input;
+use super::{TableStore, Touch};
+use crate::scan::Scanned;
+
+/// A table's drive may be above the board's by so much (V), as rounding to millivolts makes it; what it is below is how far the ground is lifted.
+const DRIVE_ROUNDING_V: f32 = 1e-3;
+
+/// Finds contacts by a table that it keeps in `S`, in frames of up to `READINGS` readings.
+#[derive(Debug)]
+pub struct ContactFinder<S, const READINGS: usize> {
+    store: S,
+    /// Bytes of the table under way, or of the one in use.
+    held: usize,
+    usable: Option<TableId>,
+    input: Input,
+    output: Output,
+    solver: Solver,
+    cells: Cells<READINGS>,
+}
+
+impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
+    /// Uses the table that `store` has kept, if it has one of this board.
+    pub const fn new(store: S) -> Self {
+        Self {
+            store,
+            held: 0,
+            usable: None,
+            input: Input::NONE,
+            output: Output::Frames,
+            solver: Solver::new(),
+            cells: Cells::NONE,
+        }
+    }
+
+    /// The table in the store's first bytes, if it is sound and one of this board.
+    fn sound(&self, length: usize) -> Option<TableId> {
+        let bytes = self.store.bytes().get(..length)?;
+        let table = Table::read(bytes).ok()?;
+        let fits = table.electrodes() == usize::from(self.input.electrodes)
+            && table.electrodes() * table.electrodes() <= READINGS
+            && table.head().drive_v <= self.input.drive_v + DRIVE_ROUNDING_V;
+        let checksum = u32::from_le_bytes(*bytes.last_chunk()?);
+        fits.then_some(TableId { layout: table.layout(), checksum })
+    }
+
+    /// Begins a new table, or goes on with the one under way; returns whether it can become one.
+    fn write(&mut self, at: usize, bytes: &[u8]) -> bool {
+        if at == 0 {
+            (self.held, self.usable, self.output) = (0, None, Output::Frames);
+        }
+        let end = at + bytes.len();
+        // A piece that came twice, or after one that was lost: the state says where to go on.
+        if at != self.held || self.usable.is_some() {
+            return true;
+        }
+        if !self.store.write(at, bytes) {
+            return false;
+        }
+        self.held = end;
+        match self.store.bytes().get(..end).and_then(Table::announced_bytes) {
+            Some(length) if length > self.store.bytes().len() || length < end => self.refuse(),
+            Some(length) if length == end => self.finish(length),
+            _ => true,
+        }
+    }
+
+    fn finish(&mut self, length: usize) -> bool {
+        let Some(table) = self.sound(length) else { return self.refuse() };
+        self.usable = Some(table);
+        self.store.keep(length)
+    }
+
+    fn refuse(&mut self) -> bool {
+        self.held = 0;
+        false
+    }
+}
+
+impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> {
+    fn meet(&mut self, hello: &Hello) {
+        self.input = Input::of(hello);
+        let length = Table::announced_bytes(self.store.bytes());
+        self.usable = length.and_then(|length| self.sound(length));
+        self.held = length.filter(|_| self.usable.is_some()).unwrap_or(0);
+    }
+
+    fn output(&self) -> Output {
+        self.output
+    }
+
+    fn set_output(&mut self, output: Output) -> bool {
+        let can = self.usable.is_some() || !output.has_contacts();
+        if can && output != self.output {
+            self.output = output;
+            self.restart();
+        }
+        can
+    }
+
+    fn take(&mut self, piece: &TablePiece) -> bool {
+        piece.bytes.is_empty() || self.write(piece.at as usize, &piece.bytes)
+    }
+
+    fn table(&self) -> TableState {
+        let [room, held] = [self.store.bytes().len(), self.held].map(|bytes| bytes as u32);
+        TableState { answers: 0, room, held, usable: self.usable }
+    }
+
+    fn restart(&mut self) {
+        self.solver.reset();
+        self.cells.restart();
+    }
+
+    fn contacts(
+        &mut self,
+        scanned: &Scanned,
+        scope: &Scope,
+        readings: &[u16],
+        attend: &mut dyn FnMut(),
+    ) -> Option<Contacts> {
+        let Self { store, held, input, output, solver, cells, .. } = self;
+        if !output.has_contacts() {
+            return None;
+        }
+        // It was read, and checked, when it came.
+        let table = Table::read_again(store.bytes().get(..*held)?).ok()?;
+        let frame = cells.touch(&table, input, (scanned, scope, readings))?;
+        let answer = solver.solve_while(&table, &frame, attend).ok()?;
+        if cells.learn(&answer, &table) {
+            // What follows is above rest.
+            solver.reset();
+        }
+        let mut contacts = told(&answer);
+        if !cells.knows_rest() {
+            contacts.flags.raise(ContactFlags::RESTING);
+        }
+        Some(contacts)
+    }
+}
+
+/// An answer as it is sent.
+fn told(answer: &Answer) -> Contacts {
+    let mut flags = ContactFlags::default();
+    for (found, sent) in [
+        (Flags::MORE, ContactFlags::MORE),
+        (Flags::MISFIT, ContactFlags::MISFIT),
+        (Flags::SATURATED, ContactFlags::SATURATED),
+    ] {
+        if answer.flags.has(found) {
+            flags.raise(sent);
+        }
+    }
+    let code = |contact: &Contact| {
+        let [x_m, y_m] = contact.sigma_m;
+        ContactCode::new(contact.id as u8, [contact.x_m, contact.y_m], contact.apparent_conductance_s, x_m.max(y_m))
+    };
+    Contacts { head: FrameHead::default(), flags, found: answer.contacts().iter().map(code).collect() }
+}

@@ -1,0 +1,79 @@
+//! Contacts on the board itself: what a board can be asked for beside frames, and how a table comes to it.
+
+mod cells;
+mod finder;
+mod input;
+mod rest;
+mod store;
+
+use tactomo_protocol::{Contacts, Hello, Output, Scope, TablePiece, TableState};
+
+pub use self::finder::ContactFinder;
+pub use self::store::{RamStore, TableStore};
+use crate::scan::Scanned;
+
+/// What a board makes of its readings: [`NoTouch`], or a [`ContactFinder`].
+pub trait Touch {
+    /// Who the board is; comes once, before all else.
+    fn meet(&mut self, hello: &Hello);
+
+    /// What is streamed.
+    fn output(&self) -> Output;
+
+    /// Streams something else; returns whether it can. If not, it stays as it was.
+    fn set_output(&mut self, output: Output) -> bool;
+
+    /// Takes a piece of a table; returns whether it can be part of one that fits the board.
+    fn take(&mut self, piece: &TablePiece) -> bool;
+
+    /// What there is of a table.
+    fn table(&self) -> TableState;
+
+    /// Begins anew, as a stream begins: the detector is taken to be at rest.
+    fn restart(&mut self);
+
+    /// The contacts of a frame, if they are streamed. Whoever has something else to do is called by `attend` meanwhile.
+    fn contacts(
+        &mut self,
+        scanned: &Scanned,
+        scope: &Scope,
+        readings: &[u16],
+        attend: &mut dyn FnMut(),
+    ) -> Option<Contacts>;
+}
+
+/// A board that streams frames and nothing else: takes no memory.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoTouch;
+
+impl Touch for NoTouch {
+    fn meet(&mut self, _hello: &Hello) {}
+
+    fn output(&self) -> Output {
+        Output::Frames
+    }
+
+    fn set_output(&mut self, output: Output) -> bool {
+        output == Output::Frames
+    }
+
+    fn take(&mut self, piece: &TablePiece) -> bool {
+        piece.bytes.is_empty()
+    }
+
+    fn table(&self) -> TableState {
+        TableState::default()
+    }
+
+    fn restart(&mut self) {}
+
+    fn contacts(
+        &mut self,
+        _scanned: &Scanned,
+        _scope: &Scope,
+        _readings: &[u16],
+        _attend: &mut dyn FnMut(),
+    ) -> Option<Contacts> {
+        None
+    }
+}

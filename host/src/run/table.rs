@@ -1,0 +1,121 @@
+//! A board that finds contacts by itself: it is given the table of its detector before it is asked for them.
+
+use std::time::{Duration, Instant};
+
+use tactomo_board::link::Link;
+use tactomo_board::measured::{self, Mismatch};
+use tactomo_board::session::{self, GreetError};
+use tactomo_board::source::{Source, SourceError};
+use tactomo_board::table::{self, TableError};
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::ForwardError;
+use tactomo_protocol::{Hello, TableId};
+use tactomo_touch::solve::{CompileError, Problem, compile};
+
+/// How long a board has to say Hello.
+const PATIENCE: Duration = Duration::from_secs(6);
+
+/// A board that was given no table.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GiveTableError {
+    /// It does not say Hello.
+    #[error("{link}")]
+    Greet {
+        /// Name of the link.
+        link: String,
+        /// Why not.
+        #[source]
+        error: GreetError,
+    },
+    /// It is of another detector.
+    #[error(transparent)]
+    Mismatch(#[from] Mismatch),
+    /// The detector has no model.
+    #[error(transparent)]
+    Model(#[from] ForwardError),
+    /// The detector has no table.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+    /// The table was not taken.
+    #[error(transparent)]
+    Table(#[from] TableError),
+}
+
+/// What a board was given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Given {
+    /// The board.
+    pub hello: Hello,
+    /// Bytes of the table.
+    pub bytes: usize,
+    /// Which table it is.
+    pub table: TableId,
+    /// Whether it had to be sent.
+    pub is_sent: bool,
+}
+
+/// Gives the board on `link` a table: this one, or that of a detector as the board measures it. `progress` is told how many bytes of how many are there.
+///
+/// # Errors
+/// [`GiveTableError`] if there is none, or the board does not take it.
+pub fn give(link: &mut dyn Link, what: &What, mut progress: impl FnMut(usize, usize)) -> Result<Given, GiveTableError> {
+    let name = link.name();
+    let hello =
+        session::greet(link, Instant::now() + PATIENCE).map_err(|error| GiveTableError::Greet { link: name, error })?;
+    let bytes = match what {
+        What::Table(bytes) => bytes.clone(),
+        What::Detector(detector) => compile(&Problem::of(&measured::as_measured(detector, &hello)?)?)?,
+    };
+    let mut is_sent = false;
+    let table = table::send(link, &bytes, |at| {
+        is_sent = true;
+        progress(at, bytes.len());
+    })?;
+    Ok(Given { hello, bytes: bytes.len(), table, is_sent })
+}
+
+/// What a board is to find contacts by.
+#[derive(Clone, Debug)]
+pub enum What {
+    /// A detector, as the board measures it.
+    Detector(Box<Detector>),
+    /// A table that was compiled before.
+    Table(Vec<u8>),
+}
+
+/// A source whose board has the table of a detector, each time that it is opened.
+pub struct WithTable {
+    source: Box<dyn Source>,
+    what: What,
+}
+
+impl WithTable {
+    /// A board on `source` that finds contacts on a detector.
+    pub fn new(source: Box<dyn Source>, detector: Detector) -> Self {
+        Self { source, what: What::Detector(Box::new(detector)) }
+    }
+}
+
+impl Source for WithTable {
+    fn name(&self) -> String {
+        self.source.name()
+    }
+
+    fn open(&mut self) -> Result<Box<dyn Link>, SourceError> {
+        let mut link = self.source.open()?;
+        let given = give(&mut *link, &self.what, |_, _| {}).map_err(|error| SourceError::Prepared(Box::new(error)))?;
+        if given.is_sent {
+            tracing::info!("{}: a table of {} bytes was sent to the board", link.name(), given.bytes);
+        }
+        Ok(link)
+    }
+
+    fn comes_back(&self) -> bool {
+        self.source.comes_back()
+    }
+
+    fn speed(&self) -> f64 {
+        self.source.speed()
+    }
+}
