@@ -9,7 +9,7 @@ use crate::python::{self, python};
 use crate::ros2;
 
 /// The topics of a file's messages, each with its messages: log time, and what it says.
-fn by_topic<'a>(messages: &'a [Value], says: usize) -> BTreeMap<&'a str, Vec<(u64, &'a Value)>> {
+fn by_topic(messages: &[Value], says: usize) -> BTreeMap<&str, Vec<(u64, &Value)>> {
     let mut topics = BTreeMap::<_, Vec<_>>::new();
     for message in messages {
         let topic = message[0].as_str().unwrap();
