@@ -5,9 +5,14 @@ mod qemu;
 #[path = "../../../firmware/boards/virt/src/table.rs"]
 mod table;
 
+use std::path::Path;
 use std::sync::OnceLock;
 
 use anyhow::{Context, Result, ensure};
+use tactomo::detector::Detector;
+use tactomo::scene::{Hand, Scene, SceneName};
+use tactomo::simulate::{Physics, Simulation};
+use tactomo::solve::{Problem, compile};
 use tactomo_protocol::{BoardMessage, Command, Fault, Frame, Plan, Scope, Settings, Status};
 
 use crate::host::Host;
@@ -137,6 +142,32 @@ fn a_panic_is_told_after_the_reset() -> Result<()> {
     // The board lives on, and does not tell it for ever.
     host.send(&Command::Start)?;
     host.frames(1)?;
+    Ok(())
+}
+
+/// Prints what contacts cost on a chip without floating-point hardware.
+#[test]
+fn contacts_cost_what_the_page_says() -> Result<()> {
+    let Some(elf) = elf()? else { return Ok(()) };
+    let detector = Detector::default();
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let [table, press] = ["virt.table", "virt.press"].map(|name| folder.join(name));
+    std::fs::write(&table, compile(&Problem::of(&detector)?)?)?;
+    let hand = Hand::relative(&detector);
+    let places_m = [[0.011, -0.007], [-0.014, 0.009], [0.002, 0.019]];
+    for count in 1..=places_m.len() {
+        let scene = Scene::new(SceneName::Rest, &detector, hand, 1);
+        let mut simulation = Simulation::new(&detector, scene, &[], 1)?;
+        let tips = places_m[..count].iter().filter_map(|at_m| hand.tip(*at_m, 0.5, 1.0).disc());
+        simulation.controls().press(tips.collect());
+        let codes = simulation.readings_v(0.0).volts().iter().flat_map(|volts| {
+            let code = (volts / detector.adc.lsb_v()).round();
+            (code as u16).to_le_bytes()
+        });
+        std::fs::write(&press, codes.collect::<Vec<_>>())?;
+        let figures = qemu::measure_contacts(elf, &table, &press)?;
+        print!("{count} contacts\n{figures}");
+    }
     Ok(())
 }
 

@@ -18,6 +18,7 @@ pub enum Request {
     Panic = 1,
     ExitOnStop = 2,
     Measure = 3,
+    MeasureContacts = 4,
 }
 
 /// Whether the tools are there; says what to install if they are not.
@@ -134,7 +135,23 @@ impl Drop for Qemu {
 /// # Errors
 /// If QEMU does not start or the board fails.
 pub fn measure(elf: &Path) -> Result<String> {
-    let output = machine(elf, Request::Measure).args(["-serial", "stdio"]).output().context("QEMU does not start")?;
+    report(&mut machine(elf, Request::Measure))
+}
+
+/// Lets it measure what contacts cost, by the table in one file, in the readings in another; returns its report.
+///
+/// # Errors
+/// If QEMU does not start or the board fails.
+pub fn measure_contacts(elf: &Path, table: &Path, readings: &Path) -> Result<String> {
+    let mut machine = machine(elf, Request::MeasureContacts);
+    for (file, place) in [(table, "0x80200000"), (readings, "0x80220000")] {
+        machine.arg("-device").arg(format!("loader,file={},addr={place},force-raw=on", file.display()));
+    }
+    report(&mut machine)
+}
+
+fn report(machine: &mut Command) -> Result<String> {
+    let output = machine.args(["-serial", "stdio"]).output().context("QEMU does not start")?;
     ensure!(output.status.success(), "QEMU failed: {}", String::from_utf8_lossy(&output.stderr));
     Ok(String::from_utf8(output.stdout)?)
 }

@@ -3,6 +3,7 @@
 
 mod closed_loop;
 mod commands;
+mod contacts;
 mod failures;
 mod parts;
 mod plans;

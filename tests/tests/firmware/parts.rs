@@ -7,7 +7,7 @@ use std::rc::Rc;
 use embedded_hal::delay::DelayNs;
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo_firmware::mux::Mux;
-use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, NoTouch, Parts, Sampler, Serial, TimedOut};
+use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, NoTouch, Parts, Sampler, Serial, TimedOut, Touch};
 use tactomo_protocol::{
     BoardMessage, BoardReceiver, Command, Fault, Frame, Hello, MAX_COMMAND, Request, encode_request,
 };
@@ -198,7 +198,7 @@ impl Chip for NullPart {
     fn feed_watchdog(&mut self) {}
 }
 
-pub type TestBoard<M, F, D> = Board16<M, TestSampler<F>, TestSerial, TestChip<D>>;
+pub type TestBoard<M, F, D, T = NoTouch> = Board16<M, TestSampler<F>, TestSerial, TestChip<D>, T>;
 
 /// The code of conversion `number` when nothing is averaged: a number of its own for every reading of a frame.
 pub fn numbered(number: u64, _electrode: u8) -> Result<u16, TimedOut> {
@@ -225,12 +225,26 @@ pub fn board<M: Mux, F, D: DelayNs>(outside: &Outside, mux: M, sample: F, delay:
 where
     F: FnMut(u64, u8) -> Result<u16, TimedOut>,
 {
+    board_with(outside, mux, sample, delay, NoTouch)
+}
+
+/// A board of these parts that may find contacts.
+pub fn board_with<M: Mux, F, D: DelayNs, T: Touch>(
+    outside: &Outside,
+    mux: M,
+    sample: F,
+    delay: D,
+    touch: T,
+) -> TestBoard<M, F, D, T>
+where
+    F: FnMut(u64, u8) -> Result<u16, TimedOut>,
+{
     let parts = Parts {
         mux,
         sampler: TestSampler(outside.clone(), sample),
         serial: TestSerial(outside.clone()),
         chip: TestChip(outside.clone(), delay),
-        touch: NoTouch,
+        touch,
     };
     Board16::new(parts, IDENTITY).unwrap()
 }
@@ -244,7 +258,7 @@ where
 }
 
 /// Takes `count` steps.
-pub fn step<M: Mux, F, D: DelayNs>(board: &mut TestBoard<M, F, D>, count: usize)
+pub fn step<M: Mux, F, D: DelayNs, T: Touch>(board: &mut TestBoard<M, F, D, T>, count: usize)
 where
     F: FnMut(u64, u8) -> Result<u16, TimedOut>,
     M::Error: std::fmt::Debug,

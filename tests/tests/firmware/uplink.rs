@@ -157,6 +157,8 @@ fn kind(message: &BoardMessage) -> char {
         BoardMessage::Log(_) => 'L',
         BoardMessage::Fault(_) => 'X',
         BoardMessage::Clock(_) => 'C',
+        BoardMessage::Contacts(_) => 'A',
+        BoardMessage::Table(_) => 'T',
     }
 }
 

@@ -11,8 +11,8 @@ mod line;
 use esp_hal::clock::CpuClock;
 use esp_hal::timer::timg::TimerGroup;
 use tactomo_board_espressif::{EspChip, brown_out, output, run};
-use tactomo_firmware::{NoTouch, Parts};
 use tactomo_firmware::mux::{Enabled, Transparent};
+use tactomo_firmware::{NoTouch, Parts};
 
 use crate::inputs::InputPins;
 use crate::line::UartLine;

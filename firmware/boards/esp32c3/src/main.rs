@@ -9,8 +9,8 @@ use esp_hal::timer::timg::TimerGroup;
 use tactomo_board_espressif::one_input::OneInput;
 use tactomo_board_espressif::usb_line::UsbLine;
 use tactomo_board_espressif::{EspChip, output, run};
-use tactomo_firmware::{NoTouch, Parts};
 use tactomo_firmware::mux::{LatchLines, Latched};
+use tactomo_firmware::{NoTouch, Parts};
 
 esp_bootloader_esp_idf::esp_app_desc!();
 

@@ -61,8 +61,13 @@ fn main() -> ! {
     let delay = core.SYST.delay(&rcc.clocks);
     let mut watchdog = IndependentWatchdog::new(device.IWDG);
     watchdog.start(WATCHDOG_TIMEOUT_MS.millis());
-    let parts =
-        Parts { mux: Transparent::new(address), sampler: inputs, serial, chip: StmChip::new(delay, counter, watchdog), touch: NoTouch };
+    let parts = Parts {
+        mux: Transparent::new(address),
+        sampler: inputs,
+        serial,
+        chip: StmChip::new(delay, counter, watchdog),
+        touch: NoTouch,
+    };
     let identity = Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),
         board: "stm32f405",

@@ -7,6 +7,7 @@ use embedded_hal::digital::{ErrorType, OutputPin};
 use tactomo_firmware::{Sampler, TimedOut};
 
 use crate::gauge::Gauge;
+use crate::machine::press;
 use crate::table::{ELECTRODES, FRAMES, reading};
 
 type Readings = [[u16; ELECTRODES]; ELECTRODES];
@@ -36,6 +37,20 @@ fn at_rest(scan: u32, ground: usize, electrode: usize) -> u16 {
     level.wrapping_add_signed((7 * (bits - 16) / 4) as i16)
 }
 
+/// What the sampler reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Played {
+    /// The frames of the table.
+    Table,
+    /// A detector at rest, with noise.
+    Rest,
+    /// One without noise, on which something presses from this scan on.
+    Press {
+        /// The scan's number.
+        from: u32,
+    },
+}
+
 /// One of the multiplexer's address lines, a bit of their levels.
 pub struct AddressLine<'a> {
     levels: &'a Cell<u8>,
@@ -63,19 +78,19 @@ impl OutputPin for AddressLine<'_> {
     }
 }
 
-/// Reads the table under the ground that the address lines tell, or a detector at rest; goes to its next frame when they come back to 0.
+/// Reads what is played under the ground that the address lines tell; goes to its next frame when they come back to 0.
 pub struct TableSampler<'a> {
     levels: &'a Cell<u8>,
     gauge: &'a Gauge,
-    rests: bool,
+    played: Played,
     scan: u32,
     ground: usize,
 }
 
 impl<'a> TableSampler<'a> {
-    /// A sampler that begins with the first frame of the table, or a detector at rest.
-    pub fn new(levels: &'a Cell<u8>, gauge: &'a Gauge, rests: bool) -> Self {
-        Self { levels, gauge, rests, scan: u32::MAX, ground: ELECTRODES - 1 }
+    /// A sampler that begins with the first frame of what is played.
+    pub fn new(levels: &'a Cell<u8>, gauge: &'a Gauge, played: Played) -> Self {
+        Self { levels, gauge, played, scan: u32::MAX, ground: ELECTRODES - 1 }
     }
 
     fn read(&mut self, electrode: usize) -> Option<u16> {
@@ -84,10 +99,14 @@ impl<'a> TableSampler<'a> {
         if self.ground == 0 && before != 0 {
             self.scan = self.scan.wrapping_add(1);
         }
-        if self.rests {
-            return Some(at_rest(self.scan, self.ground, electrode));
+        let (scan, ground) = (self.scan, self.ground);
+        let of = |frame: &Readings| frame.get(ground)?.get(electrode).copied();
+        match self.played {
+            Played::Table => of(TABLE.get(scan as usize % FRAMES)?),
+            Played::Rest => Some(at_rest(scan, ground, electrode)),
+            Played::Press { from } if scan < from => Some(0),
+            Played::Press { .. } => of(press()),
         }
-        TABLE.get(self.scan as usize % FRAMES)?.get(self.ground)?.get(electrode).copied()
     }
 }
 

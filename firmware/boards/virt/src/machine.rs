@@ -4,6 +4,8 @@ use core::ptr;
 
 use tactomo_board_common::{PanicRecord, RECORD_BYTES};
 
+use crate::table::ELECTRODES;
+
 /// Machine timer of the core-local interruptor, low and high half.
 const TIMER_LOW: *const u32 = 0x0200_BFF8 as *const u32;
 const TIMER_HIGH: *const u32 = 0x0200_BFFC as *const u32;
@@ -18,7 +20,14 @@ const TEST_RESET: u32 = 0x7777;
 unsafe extern "C" {
     static _request: u32;
     static mut _panic_record: [u8; RECORD_BYTES];
+    static mut _table: [u8; TABLE_BYTES];
+    static _press: Press;
 }
+
+/// Room for a table (bytes), as `memory.x` has it.
+const TABLE_BYTES: usize = 128 * 1024;
+/// Readings of a frame, a row for each ground.
+pub type Press = [[u16; ELECTRODES]; ELECTRODES];
 
 /// What whoever started the machine wants of it, set with
 /// `-device loader,addr=0x80110000,data-len=4,data=REQUEST`; an ordinary run leaves it zero.
@@ -32,6 +41,8 @@ pub enum Request {
     ExitOnStop,
     /// Scan without a host, print what a frame costs, and leave.
     Measure,
+    /// The same of contacts that are found in what was put into memory.
+    MeasureContacts,
 }
 
 impl Request {
@@ -42,6 +53,7 @@ impl Request {
             1 => Self::Panic,
             2 => Self::ExitOnStop,
             3 => Self::Measure,
+            4 => Self::MeasureContacts,
             _ => Self::Run,
         }
     }
@@ -92,6 +104,19 @@ pub fn wait_ns(ns: u32) {
 /// Instructions since power-on.
 pub fn instructions() -> u64 {
     riscv::register::minstret::read64()
+}
+
+/// The memory for a table.
+pub fn table_memory() -> &'static mut [u8] {
+    let table = &raw mut _table;
+    // SAFETY: RAM that nothing else uses; called once at boot.
+    unsafe { &mut *table }
+}
+
+/// Readings of something that presses.
+pub fn press() -> &'static Press {
+    // SAFETY: RAM that nothing else uses, and nothing writes to.
+    unsafe { &*&raw const _press }
 }
 
 /// The memory that outlives a reset.

@@ -15,10 +15,10 @@ use core::panic::PanicInfo;
 
 use embedded_hal::delay::DelayNs;
 use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, NoTouch, Parts, Serial, log};
-use tactomo_protocol::{Command, Fault, MAX_COMMAND, Request as HostRequest, encode_request};
+use tactomo_firmware::{Activity, Adc, Board16, Chip, ContactFinder, Identity, Parts, RamStore, Serial, log};
+use tactomo_protocol::{Command, Fault, MAX_COMMAND, Output, Request as HostRequest, encode_request};
 
-use crate::detector::{AddressLine, TableSampler, address_lines};
+use crate::detector::{AddressLine, Played, TableSampler, address_lines};
 use crate::gauge::Gauge;
 use crate::machine::Request;
 use crate::uart::Uart;
@@ -31,10 +31,15 @@ const IDENTITY: Identity = Identity {
     drive_mv: 2000,
 };
 
+/// Scan from which something presses: by then readings at rest are known.
+const PRESSED_FROM: u32 = 80;
+/// Frames that a measurement of contacts counts after the search.
+const FOLLOWED_FRAMES: u64 = 32;
 /// Frames that a measurement counts after the first: every 32nd is sent as it is.
 const MEASURED_FRAMES: u64 = 4 * 32;
 
-type VirtBoard<'a> = Board16<Transparent<AddressLine<'a>>, TableSampler<'a>, Line, VirtChip<'a>>;
+type Finder = ContactFinder<RamStore<&'static mut [u8]>, { table::ELECTRODES * table::ELECTRODES }>;
+type VirtBoard<'a> = Board16<Transparent<AddressLine<'a>>, TableSampler<'a>, Line, VirtChip<'a>, Finder>;
 
 defmt::timestamp!("{=u64:us}", machine::now_us());
 
@@ -44,12 +49,17 @@ fn main() -> ! {
     gauge::paint_stack();
     let request = Request::read();
     let (levels, gauge) = (Cell::new(0), Gauge::default());
+    let played = match request {
+        Request::Measure => Played::Rest,
+        Request::MeasureContacts => Played::Press { from: PRESSED_FROM },
+        _ => Played::Table,
+    };
     let parts = Parts {
         mux: Transparent::new(address_lines(&levels)),
-        sampler: TableSampler::new(&levels, &gauge, request == Request::Measure),
+        sampler: TableSampler::new(&levels, &gauge, played),
         serial: Line::new(request),
         chip: VirtChip(&gauge),
-        touch: NoTouch,
+        touch: ContactFinder::new(RamStore::new(machine::table_memory())),
     };
     let mut board = match VirtBoard::new(parts, IDENTITY) {
         Ok(board) => board,
@@ -57,6 +67,7 @@ fn main() -> ! {
     };
     match request {
         Request::Measure => measure(&mut board, &gauge),
+        Request::MeasureContacts => measure_contacts(&mut board, &gauge),
         _ => serve(&mut board, request),
     }
 }
@@ -100,6 +111,26 @@ fn measure(board: &mut VirtBoard, gauge: &Gauge) -> ! {
     machine::exit()
 }
 
+/// Prints what contacts cost, and leaves.
+fn measure_contacts(board: &mut VirtBoard, gauge: &Gauge) -> ! {
+    let mut frames = |count| {
+        let start = gauge.count();
+        (0..count).for_each(|_| while board.step() != Ok(Activity::Frame) {});
+        (gauge.count() - start) / count
+    };
+    frames(u64::from(PRESSED_FROM) - 1);
+    let at_rest = frames(1);
+    let (search, following) = (frames(1), frames(FOLLOWED_FRAMES));
+    Report(Uart::new()).line(&[
+        ("instructions a frame at rest", at_rest),
+        ("instructions a frame with a search", search),
+        ("instructions a frame that is followed", following),
+        ("stack bytes", gauge::stack_used_bytes() as u64),
+        ("board bytes", size_of_val(board) as u64),
+    ]);
+    machine::exit()
+}
+
 /// The line to the host: the UART, after what a measurement says in the host's place.
 struct Line {
     uart: Uart,
@@ -110,15 +141,21 @@ struct Line {
 impl Line {
     fn new(request: Request) -> Self {
         let mut command = [0; MAX_COMMAND];
-        if request != Request::Measure {
-            return Self { uart: Uart::new(), command, command_length: 0 };
-        }
+        let commands: &[Command] = match request {
+            Request::Measure => &[Command::Start],
+            Request::MeasureContacts => &[Command::Output(Output::Contacts), Command::Start],
+            _ => return Self { uart: Uart::new(), command, command_length: 0 },
+        };
         static mut NOWHERE: [u8; 8] = [0; 8];
         let nowhere = &raw mut NOWHERE;
         // SAFETY: taken once, here.
         let uart = Uart::nowhere(unsafe { &mut *nowhere });
-        let start = HostRequest { tag: 1, command: Command::Start };
-        let command_length = encode_request(&start, &mut command).unwrap_or(0);
+        let mut command_length = 0;
+        for command_to_send in commands {
+            let request = HostRequest { tag: 1, command: command_to_send.clone() };
+            command_length +=
+                command.get_mut(command_length..).map_or(0, |rest| encode_request(&request, rest).unwrap_or(0));
+        }
         Self { uart, command, command_length }
     }
 }

@@ -1,0 +1,255 @@
+//! Contacts that a board finds by itself, and the table that it finds them by.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::{Arc, LazyLock};
+
+use embedded_hal_mock::eh1::delay::NoopDelay;
+use tactomo::detector::Detector;
+use tactomo::scene::{Contact, Hand, Scene, SceneName};
+use tactomo::simulate::{Physics, Simulation};
+use tactomo::solve::{Problem, compile};
+use tactomo_firmware::{ContactFinder, RamStore, TimedOut};
+use tactomo_protocol::{
+    BoardMessage, Command, ContactFlags, Contacts, Fault, MAX_PIECE, Output, TablePiece, TableState,
+};
+
+use crate::parts::{NoMux, Outside, TestBoard, board_with, simple_board, step};
+
+/// Room for a table (bytes).
+const ROOM: usize = 128 * 1024;
+
+static DETECTOR: LazyLock<Detector> = LazyLock::new(Detector::default);
+static TABLE: LazyLock<Arc<[u8]>> = LazyLock::new(|| compile(&Problem::of(&DETECTOR).unwrap()).unwrap().into());
+
+type Sample = Box<dyn FnMut(u64, u8) -> Result<u16, TimedOut>>;
+type FindingBoard = TestBoard<NoMux, Sample, NoopDelay, ContactFinder<RamStore<Vec<u8>>, 256>>;
+
+/// A board whose store has these bytes, the voltages that it reads, and its outside.
+struct Bench {
+    board: FindingBoard,
+    volts: Rc<RefCell<Vec<f64>>>,
+    outside: Outside,
+    tag: u8,
+}
+
+impl Bench {
+    fn new(memory: Vec<u8>) -> Self {
+        let (outside, volts) = (Outside::default(), Rc::new(RefCell::new(vec![0.0; 256])));
+        let read = Rc::clone(&volts);
+        let sample: Sample = Box::new(move |number, _| {
+            let volts: f64 = read.borrow()[number as usize % 256];
+            // Noise of half a code, as a converter of little has.
+            let noise = ((number.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f64 / f64::from(1 << 24)) - 0.5;
+            Ok((volts / 3.3 * 4096.0 + 0.5 + noise).max(0.0) as u16)
+        });
+        let touch = ContactFinder::new(RamStore::new(memory));
+        let board = board_with(&outside, NoMux, sample, NoopDelay::new(), touch);
+        Self { board, volts, outside, tag: 0 }
+    }
+
+    fn with_table() -> Self {
+        let mut memory = TABLE.to_vec();
+        memory.resize(ROOM, 0);
+        Self::new(memory)
+    }
+
+    fn command(&mut self, command: Command) -> Vec<BoardMessage> {
+        self.tag = self.tag % 255 + 1;
+        self.outside.send_tagged(self.tag, command);
+        step(&mut self.board, 1);
+        self.outside.messages()
+    }
+
+    /// Sends a piece; what the board has then, and whether it refuses the piece.
+    fn piece(&mut self, at: usize, bytes: &[u8]) -> (TableState, bool) {
+        let piece = TablePiece { at: at as u32, bytes: bytes.iter().copied().collect() };
+        let messages = self.command(Command::Table(piece));
+        let state = messages.iter().find_map(|message| match message {
+            BoardMessage::Table(state) => Some(*state),
+            _ => None,
+        });
+        let refused = messages.contains(&BoardMessage::Fault(Fault::NoTable { answers: self.tag }));
+        (state.unwrap(), refused)
+    }
+
+    fn send(&mut self, table: &[u8]) -> (TableState, bool) {
+        let mut last = (TableState::default(), false);
+        for (number, bytes) in table.chunks(MAX_PIECE).enumerate() {
+            last = self.piece(number * MAX_PIECE, bytes);
+        }
+        last
+    }
+
+    /// Reads this from now on.
+    fn read(&mut self, simulation: &mut Simulation) {
+        *self.volts.borrow_mut() = simulation.readings_v(0.0).volts().to_vec();
+    }
+
+    /// Scans so many frames of this; the contacts that are sent.
+    fn scan(&mut self, simulation: &mut Simulation, frames: usize) -> Vec<Contacts> {
+        self.read(simulation);
+        step(&mut self.board, 16 * frames);
+        let contacts = |message| match message {
+            BoardMessage::Contacts(contacts) => Some(contacts),
+            _ => None,
+        };
+        self.outside.messages().into_iter().filter_map(contacts).collect()
+    }
+}
+
+fn simulation(contacts: &[Contact]) -> Simulation {
+    let scene = Scene::new(SceneName::Rest, &DETECTOR, Hand::relative(&DETECTOR), 1);
+    let simulation = Simulation::new(&DETECTOR, scene, &[], 1).unwrap();
+    simulation.controls().press(contacts.to_vec());
+    simulation
+}
+
+fn finger(at_m: [f64; 2]) -> Contact {
+    let hand = Hand::relative(&DETECTOR);
+    hand.tip(at_m, 0.5, 1.0).disc().unwrap()
+}
+
+#[test]
+fn contacts_are_where_something_presses_and_follow_a_rest_that_is_known() {
+    let mut bench = Bench::with_table();
+    bench.command(Command::Output(Output::Contacts));
+    bench.command(Command::Start);
+    let at_rest = bench.scan(&mut simulation(&[]), 80);
+    assert!(at_rest[0].flags.has(ContactFlags::RESTING) && !at_rest[79].flags.has(ContactFlags::RESTING));
+    assert!(at_rest.iter().all(|contacts| contacts.found.is_empty()));
+    let place_m = [0.011, -0.007];
+    let pressed = bench.scan(&mut simulation(&[finger(place_m)]), 20);
+    let [contact] = pressed[19].found[..] else { panic!("{:?}", pressed[19]) };
+    let off_m = contact.at_m().map(f64::from);
+    assert!((off_m[0] - place_m[0]).hypot(off_m[1] - place_m[1]) < 3e-4, "{contact:?}");
+    assert!(contact.sigma_m().is_some_and(|sigma_m| sigma_m < 1e-3), "{contact:?}");
+    assert_eq!(pressed[19].flags, ContactFlags::default());
+    assert!(pressed[1..].iter().all(|contacts| contacts.found.first().is_some_and(|first| first.id == contact.id)));
+    let sequences: Vec<_> = pressed.iter().map(|contacts| contacts.head.sequence).collect();
+    assert!(sequences.windows(2).all(|two| two[1] == two[0] + 1));
+}
+
+#[test]
+fn a_press_in_the_first_frame_is_told_and_rest_is_learned_when_it_goes() {
+    let mut bench = Bench::with_table();
+    let mut pressing = simulation(&[finger([0.0, 0.01])]);
+    bench.read(&mut pressing);
+    bench.command(Command::Output(Output::Contacts));
+    bench.command(Command::Start);
+    let pressed = bench.scan(&mut pressing, 200);
+    let is_told = |contacts: &Contacts| contacts.found.len() == 1 && contacts.flags.has(ContactFlags::RESTING);
+    assert_eq!(pressed.iter().position(|contacts| !is_told(contacts)), None, "{:?}", pressed.first());
+    let after = bench.scan(&mut simulation(&[]), 100);
+    let last = &after[99];
+    assert!(last.found.is_empty() && !last.flags.has(ContactFlags::RESTING), "{last:?}");
+}
+
+#[test]
+fn both_are_sent_under_one_number_and_frames_alone_again() {
+    let mut bench = Bench::with_table();
+    bench.command(Command::Output(Output::Both));
+    bench.command(Command::Start);
+    step(&mut bench.board, 16 * 4);
+    let numbers = |messages: Vec<BoardMessage>| -> Vec<(char, u16)> {
+        let number = |message| match message {
+            BoardMessage::Contacts(contacts) => Some(('A', contacts.head.sequence)),
+            BoardMessage::Frame(frame) => Some(('F', frame.head.sequence)),
+            _ => None,
+        };
+        messages.into_iter().filter_map(number).collect()
+    };
+    let both = numbers(bench.outside.messages());
+    assert_eq!(both[..4], [('A', 0), ('F', 0), ('A', 1), ('F', 1)]);
+    bench.command(Command::Output(Output::Frames));
+    step(&mut bench.board, 16 * 3);
+    let frames = numbers(bench.outside.messages());
+    assert!(frames.len() >= 2 && frames.iter().all(|(kind, _)| *kind == 'F'), "{frames:?}");
+}
+
+#[test]
+fn without_a_table_contacts_are_refused_and_one_that_comes_in_pieces_is_used() {
+    let mut bench = Bench::new(vec![0; ROOM]);
+    let refused = bench.command(Command::Output(Output::Contacts));
+    assert!(refused.contains(&BoardMessage::Fault(Fault::NoTable { answers: 1 })), "{refused:?}");
+    let (empty, _) = bench.piece(0, &[]);
+    assert_eq!((empty.room, empty.held, empty.usable), (ROOM as u32, 0, None));
+    // A piece that comes twice, and one that comes too early, change nothing.
+    bench.piece(0, &TABLE[..64]);
+    assert_eq!(bench.piece(128, &TABLE[128..192]), (TableState { answers: 4, held: 64, ..empty }, false));
+    bench.piece(64, &TABLE[64..128]);
+    assert_eq!(bench.piece(64, &TABLE[64..128]).0.held, 128);
+    let (state, is_refused) = bench.send(&TABLE);
+    assert!(!is_refused && state.held as usize == TABLE.len());
+    let checksum = state.usable.map(|usable| usable.checksum.to_le_bytes());
+    assert_eq!(checksum.as_ref(), TABLE.last_chunk());
+    bench.command(Command::Output(Output::Contacts));
+    bench.command(Command::Start);
+    assert_eq!(bench.scan(&mut simulation(&[]), 4).len(), 4);
+    // A new table ends the contacts of the old one.
+    assert_eq!(bench.piece(0, &TABLE[..64]).0.usable, None);
+    assert_eq!(bench.scan(&mut simulation(&[]), 4), []);
+}
+
+#[test]
+fn tables_that_are_damaged_or_of_another_detector_are_refused() {
+    let mut damaged = TABLE.to_vec();
+    damaged[5000] ^= 1;
+    let other = compile(&Problem::of(&Detector::preset("display-140x70").unwrap()).unwrap()).unwrap();
+    let stronger = Detector { drive_v: 3.0, ..DETECTOR.clone() };
+    let of_another_drive = compile(&Problem::of(&stronger).unwrap()).unwrap();
+    for (table, room) in [(&damaged, ROOM), (&other, 2 * ROOM), (&of_another_drive, ROOM), (&TABLE.to_vec(), 1000)] {
+        let mut bench = Bench::new(vec![0; room]);
+        let mut was_refused = false;
+        for (number, bytes) in table.chunks(MAX_PIECE).enumerate() {
+            let (state, is_refused) = bench.piece(number * MAX_PIECE, bytes);
+            was_refused |= is_refused;
+            assert_eq!(state.usable, None);
+        }
+        assert!(was_refused);
+    }
+}
+
+/// Any pieces in any order leave a table that is sound, or none.
+#[test]
+fn whatever_pieces_come_there_is_a_sound_table_or_none() {
+    let mut bench = Bench::new(vec![0; ROOM]);
+    let mut seed = 7u64;
+    let mut random = move |below: usize| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as usize % below
+    };
+    let mut at = 0;
+    for _ in 0..20_000 {
+        let mut bytes = TABLE[at..TABLE.len().min(at + MAX_PIECE)].to_vec();
+        match random(40) {
+            0 => at = random(TABLE.len()),
+            1 => bytes.iter_mut().for_each(|byte| *byte ^= random(256) as u8),
+            2 => bytes.truncate(random(MAX_PIECE)),
+            3 => at = 0,
+            4 => at = usize::try_from(u32::MAX).unwrap() - random(100),
+            5 => _ = bench.command(Command::Output([Output::Both, Output::Contacts][random(2)])),
+            6 => _ = bench.command(Command::Start),
+            _ => {}
+        }
+        let (state, is_refused) = bench.piece(at, &bytes);
+        at = if is_refused { 0 } else { state.held as usize % TABLE.len() };
+        let sound = state.usable.map(|usable| usable.checksum.to_le_bytes());
+        assert!(sound.is_none() || sound.as_ref() == TABLE.last_chunk());
+    }
+}
+
+#[test]
+fn a_board_without_memory_for_a_table_says_so() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, |_, _| Ok(0));
+    outside.send_tagged(9, Command::Table(TablePiece::default()));
+    outside.send_tagged(10, Command::Table(TablePiece { at: 0, bytes: [1].into_iter().collect() }));
+    outside.send_tagged(11, Command::Output(Output::Both));
+    step(&mut board, 4);
+    let messages = outside.messages();
+    assert!(messages.contains(&BoardMessage::Table(TableState { answers: 9, ..TableState::default() })));
+    for answers in [10, 11] {
+        assert!(messages.contains(&BoardMessage::Fault(Fault::NoTable { answers })), "{messages:?}");
+    }
+}
