@@ -8,6 +8,10 @@ Needs ray. The folder, which all machines of a cluster must see, gets a file of 
 `readings_v` (frames, 16, 16), `contacts` (frames, 3, 4) with `x_m`, `y_m`, `radius_m` and `conductance_s`, NaN where fewer touch, and
 `built`, the seed of the detector that was simulated. A chunk's number says all that is in it, whoever makes it: whatever is missing is made
 by calling this again.
+
+On two cores of a machine that was busy with builds, two workers made 1.58 and 1.62 times as many frames a second as one process, and 1.76 times
+with one killed in the middle (40 000 frames each, the start of the workers in it; ray 2.60). All 40 files were there and had what one process
+makes. That is with `RAY_worker_niceness=0`: ray runs its workers with a niceness of 15, and beside the builds they made 1.08 and 0.55 times as many.
 """
 
 import argparse
@@ -93,8 +97,8 @@ def main():
     args.folder.mkdir(parents=True, exist_ok=True)
     chunks = -(-args.frames // args.chunk)
     begin = time.perf_counter()
-    one = chunk(0, args.chunk)
-    alone_s = time.perf_counter() - begin
+    one = [chunk(number, args.chunk) for number in range(4)]
+    alone_per_s = len(one) * args.chunk / (time.perf_counter() - begin)
     ray.init(address=args.address, num_cpus=args.workers, include_dashboard=False, log_to_driver=False)
     begin = time.perf_counter()
     make(args.folder.resolve(), chunks, args.chunk, args.kill)
@@ -103,10 +107,14 @@ def main():
     if missing:
         sys.exit(f"chunks are missing: {missing}")
     with np.load(file_of(args.folder, 0)) as written:
-        if not all(np.array_equal(written[name], one[name], equal_nan=True) for name in one):
+        if not all(np.array_equal(written[name], one[0][name], equal_nan=True) for name in one[0]):
             sys.exit(f"{file_of(args.folder, 0)} is not the chunk that is made here: it is of another --chunk or version")
     total = chunks * args.chunk
-    print(f"{total} frames in {took_s:.1f} s, {total / took_s:.0f} a second; one process: {args.chunk / alone_s:.0f} a second")
+    per_s = total / took_s
+    print(
+        f"{total} frames in {took_s:.1f} s, {per_s:.0f} a second, {per_s / alone_per_s:.2f} times as many as "
+        f"one process with {alone_per_s:.0f}"
+    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Parts of the examples that need nothing but numpy; and what needs more, where it is installed."""
 
 import importlib.util
+import json
 import pathlib
 
 import numpy as np
@@ -57,6 +58,81 @@ def test_torch_trains_on_the_data_set(recording):
     found_m = network.train(dataset, epochs=60)
     error_m = np.linalg.norm(found_m(dataset.features) - dataset.places_m, axis=1)
     assert error_m.mean() < 2e-3
+
+
+def touch_lines(forces_n):
+    """None, one and two contacts in turn, on two detectors: lines as of an export."""
+    for index, force_n in enumerate(forces_n):
+        for patch in ("palm", "thumb"):
+            contact = {"x_m": 0.001, "y_m": -0.002, "conductance_s": 1e-4 * (1 + index)}
+            contact |= {} if force_n is None else {"force_n": force_n}
+            second = contact | {"x_m": 0.002, "conductance_s": 1e-3} | ({} if force_n is None else {"force_n": 3 * force_n})
+            contacts = [[], [contact], [contact, second]][index % 3]
+            line = {"patch": patch, "arrived_unix_s": 1e9 + index / 100, "contacts": contacts}
+            # The palm's scans are 5 ms before they came.
+            yield line | ({"host_time_ns": 10**18 + 10**7 * index - 5 * 10**6} if patch == "palm" else {})
+
+
+@pytest.mark.parametrize("force_n", [2.0, None])
+def test_frames_of_a_lerobot_data_set_are_what_its_features_say(tmp_path, force_n):
+    file = tmp_path / "touch.jsonl"
+    file.write_text("".join(json.dumps(line) + "\n" for line in touch_lines([force_n] * 9)))
+    palm, thumb = example("lerobot_dataset").touches(file)
+    assert (palm.name, thumb.name, palm.has_newtons) == ("palm", "thumb", force_n is not None)
+    for touch in (palm, thumb):
+        features, frame = touch.features(), touch.at(10**18 + 20 * 10**6)
+        assert features.keys() == frame.keys() and all(name.startswith("observation.tactile.") for name in frame)
+        for name, feature in features.items():
+            assert (frame[name].shape, frame[name].dtype) == (feature["shape"], np.dtype(feature["dtype"])), name
+            assert np.isfinite(frame[name]).all()
+    key = "observation.tactile.palm"
+    before, after = palm.at(10**18 + 15 * 10**6 - 1), palm.at(10**18 + 15 * 10**6)
+    assert [frame[f"{key}.count"][0] for frame in (before, after)] == [1, 2]
+    assert before[f"{key}.age_s"][0] == pytest.approx(0.01) and after[f"{key}.age_s"][0] == 0
+    points = after[f"{key}.points"]
+    assert points[:2, 0] == pytest.approx([0.002, 0.001]) and not points[2:].any(), "the strongest is the first"
+    if force_n:
+        assert points[:2, 5] == pytest.approx([-6, -2])
+        # Torque is place times force: y Fz, -x Fz.
+        assert after[f"{key}.wrench"] == pytest.approx([0, 0, -8, 0.016, 0.002 * 6 + 0.001 * 2, 0])
+        assert not palm.at(10**18)[f"{key}.wrench"].any()
+    else:
+        assert points[:2, 3] == pytest.approx([1e-3, 3e-4]) and f"{key}.wrench" not in after
+    with pytest.raises(ValueError, match="thumb: the first touch is 1.000 s after a picture"):
+        thumb.at(10**18 - 10**9)
+
+
+def test_touch_that_has_no_frame_is_refused(tmp_path):
+    file = tmp_path / "touch.jsonl"
+    file.write_text('{"arrived_unix_s": 1, "contacts": [{"x_m": 0, "y_m": 0, "z_m": 0.01}]}\n')
+    with pytest.raises(ValueError, match="touch is curved"):
+        example("lerobot_dataset").touches(file)
+    file.write_text('{"arrived_unix_s": 1, "contacts": [], "rezeroing": true}\n')
+    with pytest.raises(ValueError, match="has no touch"):
+        example("lerobot_dataset").touches(file)
+
+
+def test_lerobot_reads_the_data_set_that_the_example_makes(tmp_path, monkeypatch):
+    datasets = pytest.importorskip("lerobot.datasets.lerobot_dataset")
+    image = pytest.importorskip("PIL.Image")
+    (tmp_path / "touch.jsonl").write_text("".join(json.dumps(line) + "\n" for line in touch_lines([2.0] * 60)))
+    (tmp_path / "pictures").mkdir()
+    for picture in range(12):
+        shade = np.full((64, 96, 3), 20 * picture, np.uint8)
+        image.fromarray(shade).save(tmp_path / "pictures" / f"{10**18 + 10**9 * picture // 30}.png")
+    paths = [str(tmp_path / name) for name in ("touch.jsonl", "pictures", "dataset")]
+    monkeypatch.setattr("sys.argv", ["lerobot_dataset.py", *paths, "--fps", "30", "--task", "hold"])
+    lerobot_dataset = example("lerobot_dataset")
+    lerobot_dataset.main()
+    # Its other reader of videos takes a system's FFmpeg.
+    dataset = datasets.LeRobotDataset("local/dataset", root=paths[2], video_backend="pyav")
+    assert len(dataset) == 12 and dataset.fps == 30
+    palm = lerobot_dataset.touches(paths[0])[0]
+    for picture in range(12):
+        item = dataset[picture]
+        for name, value in palm.at(10**18 + 10**9 * picture // 30).items():
+            assert np.array_equal(item[name].numpy().reshape(value.shape), value), name
+        assert item["observation.images.camera"].shape == (3, 64, 96) and item["task"] == "hold"
 
 
 def test_a_chunk_of_a_data_set_is_the_same_whoever_makes_it(tmp_path):

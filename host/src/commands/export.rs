@@ -1,47 +1,45 @@
-//! `tactomo export`: a recording, solved, in a form that other programs read.
+//! `tactomo export`: a recording or a folder of them, solved, in a form that other programs read.
 
+mod answers;
+
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
-use anyhow::{Context, bail};
-use tactomo::board::frames::FileFrame;
-use tactomo::board::record::{RecordError, RecordReader};
-use tactomo::changes::Changes;
-use tactomo::pointer::Pointer;
-use tactomo::readings::Readings;
-use tactomo::run::{Arrival, Frame, TouchEvent};
+use anyhow::{Context, bail, ensure};
 use tactomo::schema::FrameReport;
-use tactomo::sink::Delivery;
-use tactomo::sink::channels::Messages;
 use tactomo::sink::lines::Fields;
 use tactomo::sink::mcap::McapFile;
-use tactomo::sink::mcap::ros2::Ros2File;
-use tactomo::solve::{Lambda, Method, Solution};
+use tactomo::sink::mcap::ros2::{self, Ros2File};
+use tactomo::solve::{Lambda, Method};
 
-use super::reconstruct::reader::{Input, Reader};
+use self::answers::{Answer, Answers, Recording};
+use super::reconstruct::reader::Input;
 use super::reconstruct::writer::{FileForm, Writer};
-use super::streams;
+use super::recording::folder;
+use super::streams::Streamed;
 use tactomo_cli::choice::{self, DetectorArgs, Model};
 use tactomo_cli::interrupt;
-use tactomo_cli::output::{NewFile, ProgressBar, message};
+use tactomo_cli::output::{NewFile, ProgressBar};
 
-/// Solves a recording and writes answers and readings for other programs.
+/// Solves a recording, or a folder of several, and writes answers and readings for other programs.
 ///
-/// The detector is the recording's own, with its calibration, unless another one is given.
+/// The detector is the recording's own, with its calibration, unless another one is given. Of a folder, as live --record makes of several
+/// boards, MCAP files and JSON Lines have all detectors by their names, in the order of their times.
 ///
 /// Examples:
 ///   tactomo export touch.tactomo --to mcap --out touch.mcap
 ///   tactomo export touch.tactomo --to mcap --profile ros2 --out touch.mcap
 ///   tactomo export touch.tactomo --to npz --fields all --out touch.npz
+///   tactomo export taken --to mcap --out all.mcap
 ///   tactomo export touch.tactomo --to csv --solver contacts --detector calibrated.toml --out touch.csv
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
-    /// The recording
-    #[arg(value_name = "RECORDING")]
+    /// The recording, or a folder of them
+    #[arg(value_name = "RECORDING|FOLDER")]
     file: PathBuf,
     /// Form of the file
     #[arg(long, value_enum, value_name = "FORM")]
@@ -111,6 +109,15 @@ impl Form {
             Self::Npz | Self::Jsonl => None,
         }
     }
+
+    /// What it is called where it is of one detector; `None` where each answer says of which it is.
+    fn of_one_detector(self) -> Option<&'static str> {
+        match self {
+            Self::Csv => Some("a CSV table"),
+            Self::Npz => Some("an NPZ file"),
+            Self::Mcap | Self::Jsonl => None,
+        }
+    }
 }
 
 /// What is written to.
@@ -123,50 +130,67 @@ enum Out {
 /// Solves and writes all frames.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let stop = interrupt::flag()?;
-    if let Some((form, _)) = args.to.with_fields_of_its_own().zip(args.fields) {
-        bail!("leave out --fields: {form} has its own");
-    }
-    if args.profile.is_some() && args.to != Form::Mcap {
-        bail!("leave out --profile: only an MCAP file has one");
-    }
-    let file = NewFile::beside(&args.file, &args.out, args.overwrite)?;
-    let open = |source| RecordError::Open { path: args.file.clone(), source };
-    let mut recording = RecordReader::open(&args.file)?;
-    let (header, last_us) = (recording.header().clone(), recording.last_time_us().map_err(open)?.unwrap_or_default());
-    let mut reader = Reader::open(&args.input())?;
-    let mut out = Out::begin((args.to, args.profile.unwrap_or_default()), file, &reader, &header.source)?;
+    let files = args.checked()?;
+    let out = args.out_beside(&files)?;
+    let open = |(name, file)| Recording::open(name, &args.input(file), args.pointer);
+    let recordings = files.iter().map(|(name, file)| open((name, file))).collect::<anyhow::Result<Vec<_>>>()?;
+    let mut out = Out::begin((args.to, args.profile.unwrap_or_default()), out, &recordings)?;
     let fields = args.fields.unwrap_or_default();
-    let mut bar = ProgressBar::new("s recorded", last_us / 1_000_000);
-    let (mut lost, mut solved) = (0, 0_u64);
-    let mut changes = Changes::default();
-    let mut pointer = args.pointer.then(Pointer::default);
-    while let Some(frame) = reader.next_frame()? {
+    let mut answers = Answers::new(recordings);
+    let mut bar = ProgressBar::new("s recorded", answers.recorded_s() as u64);
+    while let Some(answer) = answers.next()? {
         if stop.load(Ordering::Relaxed) {
             bail!("ended before {} was complete: nothing is written", args.out.display());
         }
-        let solution = reader.solve(&frame).with_context(|| reader.place())?;
-        lost += frame.lost_before;
-        let arrived_s = frame.arrived_s.unwrap_or_default();
-        let mut event = event(&reader, &frame, solution, (header.started(), lost))?;
-        if let Some(pointer) = &mut pointer {
-            event.pointer_events = pointer.take(event.frame.time_s(), &event.solution.contacts);
-        }
-        out.write(&Delivery::at_once(event, &mut changes), fields, reader.frame() as u64)?;
-        solved += 1;
-        bar.tell(arrived_s as u64);
+        out.write(&answer, fields)?;
+        bar.tell(answers.solved_s() as u64);
     }
     bar.end();
-    out.finish(&reader)?;
-    message!("{}: {solved} frames in {}", reader.name(), args.out.display());
-    reader.notice().iter().for_each(|notice| message!("{notice}"));
-    reader.losses().iter().for_each(|losses| message!("warning: {losses}"));
+    let recordings = answers.recordings();
+    out.finish(recordings)?;
+    recordings.iter().for_each(|recording| recording.tell(&args.out));
     Ok(())
 }
 
 impl Args {
-    fn input(&self) -> Input<'_> {
+    /// The recordings that are meant, each by the name of its detector, which is empty if there is one; what cannot be is said.
+    fn checked(&self) -> anyhow::Result<Vec<(String, PathBuf)>> {
+        if let Some((form, _)) = self.to.with_fields_of_its_own().zip(self.fields) {
+            bail!("leave out --fields: {form} has its own");
+        }
+        let profile = self.profile.unwrap_or_default();
+        ensure!(self.profile.is_none() || self.to == Form::Mcap, "leave out --profile: only an MCAP file has one");
+        if !self.file.is_dir() {
+            return Ok(vec![(String::new(), self.file.clone())]);
+        }
+        if let Some(form) = self.to.of_one_detector() {
+            bail!("{form} is of one detector: give a recording of {}, or --to mcap or jsonl", self.file.display());
+        }
+        ensure!(
+            self.detector.detector.is_none(),
+            "leave out --detector: the recordings of a folder have each their own"
+        );
+        let files: Vec<_> =
+            folder::recordings(&self.file)?.into_iter().map(|file| (folder::name(&file), file)).collect();
+        let called = |name: &str| if profile == Profile::Ros2 { ros2::name(name) } else { name.to_owned() };
+        let mut names = BTreeSet::new();
+        for (name, file) in &files {
+            let is_new = names.insert(called(name));
+            ensure!(is_new, "two detectors would be called {}: give {} another name", called(name), file.display());
+        }
+        Ok(files)
+    }
+
+    /// The file to write, which is none of those that are read.
+    fn out_beside(&self, files: &[(String, PathBuf)]) -> anyhow::Result<NewFile> {
+        let beside = |(_, file): &(String, PathBuf)| NewFile::beside(file, &self.out, self.overwrite);
+        let checked = files.iter().map(beside).collect::<anyhow::Result<Vec<_>>>()?;
+        checked.into_iter().next().context("no recording")
+    }
+
+    fn input<'a>(&'a self, file: &'a Path) -> Input<'a> {
         Input {
-            file: &self.file,
+            file,
             detector: &self.detector,
             model: self.model,
             solver: Some(self.solver),
@@ -180,66 +204,39 @@ impl Args {
     }
 }
 
-/// What a frame gave; `lost` frames so far of a recording that was `started` at that time since 1970.
-fn event(
-    reader: &Reader,
-    frame: &FileFrame,
-    solution: Solution,
-    (started, lost): (Duration, u64),
-) -> anyhow::Result<TouchEvent> {
-    let electrodes = frame.volts.len().isqrt();
-    let used = Readings::new(electrodes, reader.used_v().to_vec());
-    let touch = reader.touch(frame).with_context(|| reader.place())?;
-    let (measured, used) = frame.measured().zip(used).with_context(|| reader.place())?;
-    let time_s = frame.time_s.unwrap_or_default().max(0.0);
-    let arrived = Duration::from_secs_f64(frame.arrived_s.unwrap_or(time_s).max(0.0));
-    let came = Frame {
-        sequence: frame.sequence.unwrap_or_default(),
-        delay: frame.delay,
-        board_time_us: (time_s * 1e6).round() as u64,
-        lost,
-        ..Frame::first(measured, used.saying(|g, e| touch.says(g, e)), Arrival::recorded(started + arrived))
-    };
-    Ok(TouchEvent {
-        lost_before: frame.lost_before,
-        is_taking_baseline: reader.is_taking_baseline(),
-        ..TouchEvent::new(came, touch, solution)
-    })
-}
-
 impl Out {
-    fn begin((form, profile): (Form, Profile), file: NewFile, reader: &Reader, source: &str) -> anyhow::Result<Self> {
+    fn begin((form, profile): (Form, Profile), file: NewFile, recordings: &[Recording]) -> anyhow::Result<Self> {
         let form = match form {
             Form::Npz => FileForm::Npz,
             Form::Csv => FileForm::Csv,
             Form::Jsonl => FileForm::JsonLines,
             Form::Mcap => {
-                let (detector, mesh) = reader.measured().zip(reader.mesh()).context("an MCAP file needs a detector")?;
-                let about = streams::about(detector, source);
-                if profile == Profile::Ros2 {
-                    let mcap = Ros2File::new(file.create()?, detector, &about)?;
-                    return Ok(Self::Ros2(Box::new(mcap), file));
+                let streamed = recordings.iter().map(Recording::streamed).collect::<anyhow::Result<Vec<_>>>()?;
+                let (messages, about) = Streamed::parts(streamed);
+                if profile == Profile::Foxglove {
+                    let mcap = McapFile::new(file.create()?, messages, about)?;
+                    return Ok(Self::Mcap(Box::new(mcap), file));
                 }
-                let messages = Messages::new(detector, mesh.clone(), reader.usual_radius_m());
-                let mcap = McapFile::new(file.create()?, vec![messages], about)?;
-                return Ok(Self::Mcap(Box::new(mcap), file));
+                let detectors = recordings.iter().filter_map(Recording::named).collect();
+                let mcap = Ros2File::new(file.create()?, detectors, &about)?;
+                return Ok(Self::Ros2(Box::new(mcap), file));
             }
         };
         Ok(Self::Table(Writer::to_file(form, file)?))
     }
 
-    fn write(&mut self, delivery: &Delivery, fields: Fields, number: u64) -> anyhow::Result<()> {
+    fn write(&mut self, Answer { delivery, number }: &Answer, fields: Fields) -> anyhow::Result<()> {
         match self {
             Self::Mcap(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
             Self::Ros2(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
             Self::Table(writer) => {
-                let report = FrameReport { frame: Some(number), ..fields.of(delivery) };
+                let report = FrameReport { frame: Some(*number), ..fields.of(delivery) };
                 writer.write(&report).map(drop)
             }
         }
     }
 
-    fn finish(self, reader: &Reader) -> anyhow::Result<()> {
+    fn finish(self, recordings: &[Recording]) -> anyhow::Result<()> {
         match self {
             Self::Mcap(mcap, file) => {
                 mcap.finish().context("cannot write the MCAP file")?;
@@ -249,7 +246,8 @@ impl Out {
                 mcap.finish().context("cannot write the MCAP file")?;
                 file.finish()
             }
-            Self::Table(writer) => writer.finish(reader.mesh()),
+            // What has a mesh in it is of one detector.
+            Self::Table(writer) => writer.finish(recordings.first().and_then(Recording::mesh)),
         }
     }
 }

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::ensure;
 use tactomo::detector::Detector;
+use tactomo::forward::ImageMesh;
 use tactomo::schema::SCHEMA;
 use tactomo::sink::Sinks;
 use tactomo::sink::address::Address;
@@ -69,14 +70,14 @@ impl StreamArgs {
                 message!("stream: tcp:{at}");
             }
         }
-        let (messages, about): (Vec<_>, Vec<_>) = detectors.into_iter().map(|of| (of.messages, of.about)).unzip();
+        let (messages, about) = Streamed::parts(detectors);
         if let Some(address) = &self.foxglove {
             let address = address.clone().unwrap_or(Address::local(foxglove::DEFAULT_PORT));
             let at = sinks.add_foxglove(&address, messages.clone(), door)?;
             message!("Foxglove: open ws://{at} in the app");
         }
         if let Some(path) = &self.mcap {
-            sinks.add_mcap(path, messages, about.into_iter().flatten().collect())?;
+            sinks.add_mcap(path, messages, about)?;
         }
         Ok(sinks)
     }
@@ -92,25 +93,33 @@ pub struct Streamed {
 impl Streamed {
     /// Of a detector whose readings come from such a source.
     pub fn new(problem: &Problem, source: &str) -> Self {
-        Self { messages: messages(problem), about: about(problem.detector(), source) }
+        Self::of(problem.detector(), &problem.jacobian.image_mesh, ContactSettings::of(problem).radius_m, source)
     }
 
-    /// The same, of one of several by this name, at its place on the body.
+    /// The same of a detector with images on such a mesh; contacts whose radius is not known are drawn with the usual one (m).
+    pub fn of(detector: &Detector, mesh: &ImageMesh, usual_radius_m: f64, source: &str) -> Self {
+        Self { messages: Messages::new(detector, mesh.clone(), usual_radius_m), about: about(detector, source) }
+    }
+
+    /// The same, of one of several by this name, at its place on the body; an empty name is of a detector that is alone.
     pub fn of_patch(self, name: &str, place: Option<Place>) -> Self {
+        if name.is_empty() {
+            return self;
+        }
         let placed = place.map(|place| ("place".to_owned(), place.to_string()));
         let about = self.about.into_iter().chain(placed).map(|(key, value)| (format!("{name}.{key}"), value)).collect();
         Self { messages: self.messages.of_patch(name).at(place), about }
     }
-}
 
-/// What makes the messages of Foxglove and MCAP files.
-pub fn messages(problem: &Problem) -> Messages {
-    let radius_m = ContactSettings::of(problem).radius_m;
-    Messages::new(problem.detector(), problem.jacobian.image_mesh.clone(), radius_m)
+    /// What makes the messages of all, and what an MCAP file of them says of itself.
+    pub fn parts(all: Vec<Self>) -> (Vec<Messages>, BTreeMap<String, String>) {
+        let (messages, about): (Vec<_>, Vec<_>) = all.into_iter().map(|of| (of.messages, of.about)).unzip();
+        (messages, about.into_iter().flatten().collect())
+    }
 }
 
 /// What an MCAP file says of itself.
-pub fn about(detector: &Detector, source: &str) -> BTreeMap<String, String> {
+fn about(detector: &Detector, source: &str) -> BTreeMap<String, String> {
     let about = [
         ("schema", SCHEMA.to_string()),
         ("detector", detector.name.clone()),

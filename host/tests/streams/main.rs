@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
+mod folder;
 mod foxglove;
 mod lines;
 mod program;

@@ -70,7 +70,7 @@ pub fn run(python: &Path, script: &str, args: &[&Path]) -> Vec<Value> {
 }
 
 /// What Python finds in a file, `whole` or `broken`.
-fn read(python: &Path, file: &Path, state: &str) -> Vec<Value> {
+pub fn read(python: &Path, file: &Path, state: &str) -> Vec<Value> {
     run(python, READ, &[file, Path::new(state)])
 }
 
@@ -82,7 +82,7 @@ fn done(args: &[&str]) -> String {
 }
 
 /// Numbers of the field of a grid that is `offset` bytes after the first.
-fn grid(message: &Value, offset: usize) -> Vec<f64> {
+pub fn grid(message: &Value, offset: usize) -> Vec<f64> {
     let data = data_encoding::BASE64.decode(message["data"].as_str().unwrap().as_bytes()).unwrap();
     let cells = data.chunks(message["cell_stride"].as_u64().unwrap() as usize);
     cells.map(|cell| f64::from_le_bytes(cell[offset..offset + 8].try_into().unwrap())).collect()

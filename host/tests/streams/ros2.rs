@@ -6,7 +6,7 @@ use crate::program::{path, tactomo};
 use crate::python::{python, run};
 
 /// Prints each message of a file as JSON: topic, log time, and its fields, as both packages have them, which have to agree.
-const READ: &str = r#"
+pub const READ: &str = r#"
 import json, math, sys
 from pathlib import Path
 import numpy as np

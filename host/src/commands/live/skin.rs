@@ -195,6 +195,9 @@ fn said(error: &clap::Error) -> String {
 }
 
 #[cfg(test)]
+mod fuzz;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -19,7 +19,10 @@ pub fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// The recordings in a folder, by name.
-fn recordings(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+///
+/// # Errors
+/// If it cannot be read, or has none.
+pub fn recordings(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
     let paths = entries.map(|entry| Ok(entry.with_context(|| format!("cannot read {}", folder.display()))?.path()));
     let mut files: Vec<_> = paths.collect::<anyhow::Result<_>>()?;
@@ -27,6 +30,11 @@ fn recordings(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     files.sort();
     ensure!(!files.is_empty(), "{} has no recordings", folder.display());
     Ok(files)
+}
+
+/// What the detector of a recording in a folder is called: as its file, without what that ends in.
+pub fn name(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Cuts the same piece out of all recordings of a folder: times count from the start of the first that began. Returns the new ones.

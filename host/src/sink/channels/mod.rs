@@ -27,7 +27,17 @@ use super::lines::Fields;
 use super::place::{BODY, Place};
 
 /// What places of a detector that is alone are relative to.
-pub(super) const FRAME: &str = "tactomo";
+const FRAME: &str = "tactomo";
+
+/// What places of a detector are relative to, by the name that it has among several; empty if it is alone.
+pub(super) fn frame_id(patch: &str) -> &str {
+    if patch.is_empty() { FRAME } else { patch }
+}
+
+/// A topic of a detector, by the same name.
+pub(super) fn topic(patch: &str, what: &str) -> String {
+    if patch.is_empty() { format!("/tactomo/{what}") } else { format!("/tactomo/{patch}/{what}") }
+}
 
 /// A channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,10 +124,8 @@ impl Topics {
 
     /// What a topic is called.
     pub fn name(&self, Topic { detector, channel }: Topic) -> String {
-        match self.0.get(detector).map(|messages| &*messages.patch) {
-            None | Some("") => format!("/tactomo/{}", channel.name()),
-            Some(patch) => format!("/tactomo/{patch}/{}", channel.name()),
-        }
+        let patch = self.0.get(detector).map_or("", |messages| &messages.patch);
+        self::topic(patch, channel.name())
     }
 
     /// Writes the message of a topic; `false` if the event is of another detector, or has nothing for it.
@@ -161,18 +169,13 @@ impl Messages {
         Self { place, ..self }
     }
 
-    /// What places are relative to: the detector, with x and y from its middle.
-    fn frame_id(&self) -> &str {
-        if self.patch.is_empty() { FRAME } else { &self.patch }
-    }
-
     /// Writes the message of a channel; `false` if the event has nothing for it.
     ///
     /// # Errors
     /// If memory ends, which `serde_json` cannot tell from anything else.
     pub fn write(&self, channel: Channel, delivery: &Delivery, out: &mut Vec<u8>) -> io::Result<bool> {
         let event = &*delivery.event;
-        let at = At { frame_id: self.frame_id(), stamp: Stamp::of(event.frame.stamp_ns()) };
+        let at = At { frame_id: frame_id(&self.patch), stamp: Stamp::of(event.frame.stamp_ns()) };
         match channel {
             Channel::Touch => put(&Fields::default().of(delivery), out),
             Channel::Contacts => put(&scene::update(&event.solution, self.usual_radius_m, at), out),

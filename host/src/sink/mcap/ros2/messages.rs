@@ -7,8 +7,7 @@ use tactomo_touch::schema::{CONTACT_COLUMNS, Kind};
 use tactomo_touch::solve::FoundContact;
 
 use super::cdr::Cdr;
-use crate::run::TouchEvent;
-use crate::sink::channels::FRAME;
+use crate::sink::channels::frame_id;
 use crate::sink::feed::Delivery;
 
 /// Types of fields, as `sensor_msgs/PointField` counts them.
@@ -28,13 +27,13 @@ const FIELDS: [(&str, u8); 7] = [
 const UNKNOWN: u8 = 255;
 
 /// A message that begins with a header: when the frame was scanned, as far as is known, and what places are relative to.
-fn stamped(event: &TouchEvent) -> Cdr {
-    let stamp_ns = event.frame.stamp_ns();
+fn stamped(delivery: &Delivery) -> Cdr {
+    let stamp_ns = delivery.event.frame.stamp_ns();
     let (seconds, nanoseconds) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
     let mut message = Cdr::new();
     // Seconds of ROS 2 are signed and of 32 bits: they end in 2038.
     message.put(i32::try_from(seconds).unwrap_or(i32::MAX).to_le_bytes());
-    message.put((nanoseconds as u32).to_le_bytes()).text(FRAME);
+    message.put((nanoseconds as u32).to_le_bytes()).text(frame_id(&delivery.patch));
     message
 }
 
@@ -50,7 +49,7 @@ pub(super) fn points(delivery: &Delivery) -> Cdr {
     };
     let data: Vec<u8> = contacts.iter().flat_map(point).collect();
     let (height, width, step) = (1_u32, contacts.len() as u32, 4 * FIELDS.len() as u32);
-    let mut message = stamped(&delivery.event);
+    let mut message = stamped(delivery);
     message.put(height.to_le_bytes()).put(width.to_le_bytes());
     message.all(FIELDS.iter().enumerate(), |message, (index, (name, datatype))| {
         message.text(name).put((4 * index as u32).to_le_bytes()).put([*datatype]).put(1_u32.to_le_bytes());
@@ -78,7 +77,7 @@ pub(super) fn wrench(delivery: &Delivery, detector: &Detector) -> Option<Cdr> {
         }
     }
     (solution.is_contacts() && are_known && has_law).then(|| {
-        let mut message = stamped(event);
+        let mut message = stamped(delivery);
         for value in force_n.into_iter().chain(torque_n_m) {
             message.number(Some(value));
         }
@@ -98,7 +97,7 @@ pub(super) fn contacts(delivery: &Delivery) -> Cdr {
     let event = &*delivery.event;
     let solution = &event.solution;
     let flags = &solution.flags;
-    let mut message = stamped(event);
+    let mut message = stamped(delivery);
     message.put(event.frame.sequence.to_le_bytes()).number(Some(event.frame.time_s()));
     message.put(delivery.lost_before.to_le_bytes()).flag(event.is_taking_baseline);
     message.all(delivery.changed.contacts.iter(), contact);
@@ -132,7 +131,7 @@ fn contact(message: &mut Cdr, contact: &FoundContact) {
 /// Readings (`tactomo_msgs/msg/Frame`).
 pub(super) fn frame(delivery: &Delivery) -> Cdr {
     let event = &*delivery.event;
-    let mut message = stamped(event);
+    let mut message = stamped(delivery);
     message.put(event.frame.sequence.to_le_bytes()).number(Some(event.frame.time_s()));
     message.put((event.frame.measured.electrodes() as u16).to_le_bytes());
     for readings in [&event.frame.measured, &event.frame.used, &event.touch] {

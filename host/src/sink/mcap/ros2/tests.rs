@@ -271,9 +271,25 @@ fn a_message_is_these_bytes() {
 #[test]
 fn a_file_has_the_topics_of_its_profile() {
     let mut bytes = Vec::new();
-    let mut file = Ros2File::new(&mut bytes, &Detector::default(), &BTreeMap::new()).unwrap();
+    let detectors = vec![(Arc::default(), Detector::default())];
+    let mut file = Ros2File::new(&mut bytes, detectors, &BTreeMap::new()).unwrap();
     file.write(&delivery(two())).unwrap();
     file.finish().unwrap();
     // The header's profile, behind the magic and the record's opcode and length.
     assert_eq!(bytes[17..25], [4, 0, 0, 0, b'r', b'o', b's', b'2']);
+}
+
+#[test]
+fn topics_are_called_as_ros_2_has_names() {
+    let names = ["", "thumb", "board-1", "2nd", "_x", "a b"].map(name);
+    assert_eq!(names, ["", "thumb", "board_1", "patch_2nd", "patch__x", "a_b"]);
+}
+
+#[test]
+fn places_are_in_the_frame_of_their_detector() {
+    let of_thumb = Delivery { patch: "thumb-1".into(), ..delivery(two()) };
+    for topic in [Topic::Points, Topic::Contacts, Topic::Frame] {
+        let found = fields(topic, &of_thumb, &Detector::default()).unwrap();
+        assert_eq!(text(&found, "header.frame_id"), "thumb-1");
+    }
 }
