@@ -119,7 +119,7 @@ pub fn table_memory() -> &'static mut [u8] {
 /// Readings of something that presses.
 pub fn press() -> &'static Press {
     // SAFETY: RAM that nothing else uses, and nothing writes to.
-    unsafe { &*&raw const _press }
+    unsafe { &_press }
 }
 
 /// The memory that outlives a reset.

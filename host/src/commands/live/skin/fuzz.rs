@@ -103,7 +103,7 @@ fn check(test: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
     fs::write(&path, bytes).map_err(|error| TestCaseError::fail(error.to_string()))?;
     match read(&path) {
         Ok(patches) => {
-            let names: BTreeSet<_> = patches.iter().map(|(name, _)| name.as_str()).collect();
+            let names: BTreeSet<_> = patches.iter().map(|patch| patch.name.as_str()).collect();
             prop_assert!(!names.is_empty() && names.len() == patches.len(), "{:?}", names);
             let are_names = names.iter().flat_map(|name| name.chars()).all(|c| c.is_ascii() && c != '/');
             prop_assert!(are_names && !names.contains(""), "{:?}", names);
