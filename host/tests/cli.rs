@@ -296,7 +296,7 @@ fn the_detectors_of_a_skin_are_shown_each_by_its_name() {
 fn a_stream_of_several_detectors_names_each_and_keeps_the_order_of_its_times() {
     let (folder, skin) = (Folder::new("several"), concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml"));
     let stream = folder.path("hand.jsonl");
-    let output = TACTOMO.run(&["live", "--skin", skin, "--seconds", "0.5", "--json", "--stream", &stream]);
+    let output = TACTOMO.run(&["live", "--skin", skin, "--seconds", "2", "--json", "--stream", &stream]);
     assert_eq!(output.status.code(), Some(0));
     let text = std::fs::read_to_string(&stream).unwrap();
     let mut times = std::collections::BTreeMap::<String, Vec<f64>>::new();
