@@ -91,7 +91,7 @@ impl ContactFlags {
 /// A contact as it is sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ContactCode {
-    /// Number that it keeps from frame to frame, modulo 256.
+    /// Number that it keeps from frame to frame: 1 to 255, then from 1 again.
     pub id: u8,
     /// Place, x and y, in units of 10 um.
     pub at: [i16; 2],

@@ -51,6 +51,7 @@ pub struct Solver {
     circuit: Circuit,
     scene: Scene,
     ids: [u32; MAX_CONTACTS],
+    /// Numbers begin at 1.
     next_id: u32,
     /// What the last search left of a reading, and the frames that one that did not end well is not repeated for.
     searched: f32,
@@ -73,7 +74,7 @@ impl Solver {
             circuit: Circuit::EMPTY,
             scene: Scene::EMPTY,
             ids: [0; MAX_CONTACTS],
-            next_id: 0,
+            next_id: 1,
             searched: 0.0,
             more: false,
             patience: PATIENCE[0],
@@ -241,7 +242,7 @@ impl Solver {
         }
         for k in (0..count).filter(|k| !given[*k]) {
             self.ids[k] = self.next_id;
-            self.next_id = self.next_id.wrapping_add(1);
+            self.next_id = self.next_id.checked_add(1).unwrap_or(1);
         }
     }
 

@@ -161,7 +161,8 @@ fn told(answer: &Answer) -> Contacts {
     }
     let code = |contact: &Contact| {
         let [x_m, y_m] = contact.sigma_m;
-        ContactCode::new(contact.id as u8, [contact.x_m, contact.y_m], contact.apparent_conductance_s, x_m.max(y_m))
+        let id = (contact.id.wrapping_sub(1) % u32::from(u8::MAX)) as u8 + 1;
+        ContactCode::new(id, [contact.x_m, contact.y_m], contact.apparent_conductance_s, x_m.max(y_m))
     };
     Contacts { head: FrameHead::default(), flags, found: answer.contacts().iter().map(code).collect() }
 }
