@@ -293,6 +293,30 @@ fn the_detectors_of_a_skin_are_shown_each_by_its_name() {
 }
 
 #[test]
+fn contacts_that_the_board_finds_are_streamed_recorded_and_shown_again() {
+    let folder = Folder::new("board-sends");
+    let (first, again, both) = (folder.path("first.jsonl"), folder.path("again.jsonl"), folder.path("both.jsonl"));
+    let recording = folder.path("contacts.tactomo");
+    let live = ["live", "--json", "--stream"];
+    let board = ["--simulate", "--board", "ideal", "--scene", "single", "--seconds", "1.5", "--board-sends"];
+    let found = |file: &str, options: &[&str]| {
+        let output = TACTOMO.run(&[&live, &[file][..], options].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = std::fs::read_to_string(file).unwrap();
+        let lines: Vec<serde_json::Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let last = lines.last().unwrap()["contacts"][0].clone();
+        assert!(lines.len() > 50, "{} lines", lines.len());
+        (lines.len(), [last["x_m"].as_f64().unwrap(), last["y_m"].as_f64().unwrap()])
+    };
+    let (count, at_m) = found(&first, &[&board[..], &["contacts", "--record", &recording]].concat());
+    let (played, again_m) = found(&again, &["--replay", &recording, "--speed", "max"]);
+    assert!(played >= count, "{played} of {count}");
+    assert_eq!(again_m, at_m);
+    let (_, both_m) = found(&both, &[&board[..], &["both"]].concat());
+    assert!((both_m[0] - at_m[0]).hypot(both_m[1] - at_m[1]) < 5e-4, "{both_m:?} {at_m:?}");
+}
+
+#[test]
 fn a_stream_of_several_detectors_names_each_and_keeps_the_order_of_its_times() {
     let (folder, skin) = (Folder::new("several"), concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml"));
     let stream = folder.path("hand.jsonl");

@@ -57,7 +57,6 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
         if at == 0 {
             (self.held, self.usable, self.output) = (0, None, Output::Frames);
         }
-        let end = at + bytes.len();
         // A piece that came twice, or after one that was lost: the state says where to go on.
         if at != self.held || self.usable.is_some() {
             return true;
@@ -65,6 +64,7 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
         if !self.store.write(at, bytes) {
             return false;
         }
+        let end = at + bytes.len();
         self.held = end;
         match self.store.bytes().get(..end).and_then(Table::announced_bytes) {
             Some(length) if length > self.store.bytes().len() || length < end => self.refuse(),

@@ -294,12 +294,12 @@ fn options(
     listener: Option<Box<dyn Listener>>,
 ) -> anyhow::Result<RunOptions> {
     let detector = show.detector.clone();
-    let learning = show.learning.clone();
+    let solving = Solving { learning: show.learning.clone(), ..Solving::new(method(&show.picture, &problem), problem) };
     Ok(RunOptions {
         settings: show.settings,
         scan: show.scan.clone(),
         output: show.output,
-        solving: Some(Solving { learning, ..Solving::new(method(&show.picture, &problem), problem) }),
+        solving: Some(if show.output.has_frames() { solving } else { solving.on_board() }),
         recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
         begin_recording: Some(keep::on_request(detector.clone(), show.source.name(), name)),
         listeners: listener.into_iter().collect(),

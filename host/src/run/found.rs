@@ -1,9 +1,25 @@
 //! What a board has found by itself, as solvers of this program tell it.
 
+use tactomo_physics::readings::Readings;
 use tactomo_protocol::{ContactCode, ContactFlags, Contacts, Status};
-use tactomo_touch::solve::{Flags, FoundContact, Solution, Uncertainty};
+use tactomo_touch::solve::{Flags, FoundContact, Solution, SolveError, Solver, Uncertainty};
 
 use super::inbox::Found;
+
+/// Where the board solves: no readings come here.
+pub(super) struct OnBoard;
+
+impl Solver for OnBoard {
+    fn name(&self) -> &'static str {
+        "core"
+    }
+
+    fn solve(&mut self, _readings: &Readings) -> Result<Solution, SolveError> {
+        Ok(Solution::default())
+    }
+
+    fn reset(&mut self) {}
+}
 
 /// The contacts of a packet, whose readings came too or did not.
 pub(super) fn found(contacts: &Contacts, has_readings: bool) -> Found {

@@ -10,6 +10,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 use super::calibration::{LearnedInUse, Learning};
+use super::found::OnBoard;
 use super::scanning::ScanChoice;
 use super::{Latency, Listener, Order, Request, Snapshot};
 use tactomo_board::baseline::BaselineTracker;
@@ -128,6 +129,11 @@ impl Solving {
             }),
             learning: None,
         }
+    }
+
+    /// Takes what the board has found, of which no readings come: so there is nothing to make a solver of, and nothing to learn.
+    pub fn on_board(self) -> Self {
+        Self { make: Arc::new(|_| Ok(Box::new(OnBoard))), learning: None, ..self }
     }
 }
 
@@ -251,10 +257,8 @@ pub enum LiveError {
         /// Name of the link.
         link: String,
     },
-    /// It was asked for contacts and does not send them.
-    #[error(
-        "{link}: the board does not send contacts, though it was given a table: its firmware is older than this program; flash it with `tactomo board flash`"
-    )]
+    /// It was given a table, and does not find contacts by it.
+    #[error("{link}: the board refuses to send contacts, as it has lost the table that it was given")]
     NoContacts {
         /// Name of the link.
         link: String,

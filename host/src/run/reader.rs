@@ -227,10 +227,10 @@ impl Reader {
     }
 
     fn frame(&mut self, connection: &mut Connection, frame: &tactomo_protocol::Frame, received: Instant) {
-        connection.session.frame(received);
-        connection.landed();
         // Before Hello nobody knows what the readings mean.
         let (Some(board), Some(_)) = (&self.board, connection.junk) else { return };
+        connection.session.frame(received);
+        connection.landed();
         if !self.options.output.has_frames() {
             return;
         }
@@ -269,6 +269,9 @@ impl Reader {
 
     /// Takes contacts that the board has found; where their readings come too, these bring them along.
     fn contacts(&mut self, connection: &mut Connection, contacts: Contacts, received: Instant) {
+        if self.board.is_none() || connection.junk.is_none() {
+            return;
+        }
         connection.session.contacts(received);
         connection.landed();
         match self.options.output {
@@ -276,14 +279,21 @@ impl Reader {
             Output::Frames if connection.answers => {}
             // Of a recording nobody knows whether readings follow before something else does.
             Output::Frames | Output::Both => {
-                let before = self.found.replace(contacts);
-                before.into_iter().for_each(|before| self.contacts_alone(connection, &before, received));
+                self.take_found_alone(connection, received);
+                self.found = Some(contacts);
             }
         }
     }
 
+    /// Takes contacts whose readings have not come.
+    fn take_found_alone(&mut self, connection: &mut Connection, received: Instant) {
+        if let Some(contacts) = self.found.take() {
+            self.contacts_alone(connection, &contacts, received);
+        }
+    }
+
     fn contacts_alone(&mut self, connection: &mut Connection, contacts: &Contacts, received: Instant) {
-        let (Some(board), Some(_)) = (&self.board, connection.junk) else { return };
+        let Some(board) = &self.board else { return };
         let place = self.sequence.place(&contacts.head);
         self.frames_lost += place.dropped;
         self.notice.count(|meter| meter.frame(received, &contacts.head, place.dropped));

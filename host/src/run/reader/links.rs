@@ -113,7 +113,7 @@ impl Reader {
         connection.session.request_output(self.options.output);
         let mut buffer = [0; READ_BYTES];
         self.sequence.restart();
-        self.newest = None;
+        (self.newest, self.found) = (None, None);
         // Who did not answer here before is waited for as before.
         if !matches!(self.missed, Some(LiveError::Greet { .. })) {
             self.enter(LinkState::Waiting);
@@ -126,16 +126,21 @@ impl Reader {
                     self.recordings.asked(connection.session.take_sent());
                     if link.jumped() {
                         self.sequence.restart();
-                        self.newest = None;
+                        (self.newest, self.found) = (None, None);
                         connection.jumped();
                         self.inbox.jump();
                     }
                     self.receive(&mut connection, link, &buffer[..count])?;
                 }
-                Err(error) => return lost(link, error, comes_back),
+                Err(error) => {
+                    self.take_found_alone(&mut connection, Instant::now());
+                    return lost(link, error, comes_back);
+                }
             }
             if connection.session.output_state() == WishState::Refused {
-                return Err(LiveError::NoContacts { link: link.name() });
+                let error = LiveError::NoContacts { link: link.name() };
+                // When it is opened again it is given its table again.
+                return if comes_back { Ok(End::Lost(with_causes(&error))) } else { Err(error) };
             }
             if comes_back && let Some(error) = connection.in_vain() {
                 return self.unanswered(error, link);
