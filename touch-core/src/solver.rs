@@ -25,7 +25,7 @@ const MISFIT_DEVIATIONS: f32 = 5.0;
 const WORSE: f32 = 1.3;
 /// Steps at most where a contact is followed, and where it is searched.
 const FOLLOWING: usize = 4;
-const SEARCHING: usize = 40;
+const SEARCHING: usize = 20;
 /// Conductance (sheet conductances) above which more would change nothing.
 const SATURATED_SHEETS: f32 = 100.0;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
@@ -124,6 +124,7 @@ impl Solver {
             found = found.and_then(|fit| self.pruned(fit, task, &mut work));
             found = found.map(|fit| self.completed(fit, task, &mut work));
             found = found.map(|fit| self.exchanged(fit, task, &mut work));
+            found = found.map(|fit| self.reduced(fit, task, &mut work));
             self.more &= found.is_some();
             self.searched = found.map_or(0.0, |fit| fit.normal.cost);
             let fits = found.is_none_or(|fit| !is_misfit(&fit, readings));
@@ -245,6 +246,21 @@ impl Solver {
             match new.filter(|new| score(new) < score(&best) - PARAMETER_PRICE) {
                 Some(new) => (best, kept) = (new, 0),
                 None => (k, kept, self.more) = (k + 1, kept + 1, before),
+            }
+        }
+        best
+    }
+
+    /// Contacts without those that the others do as well without, once they are fitted anew: a second one that was found while the first was too small.
+    fn reduced(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
+        while best.scene.count > 1 {
+            let mut fewer = None;
+            for k in 0..best.scene.count {
+                fewer = better(fewer, self.fit(best.scene.without(k), ANY_RADIUS, SEARCHING, task, work));
+            }
+            match fewer.filter(|fewer| score(fewer) < score(&best)) {
+                Some(fewer) => best = fewer,
+                None => return best,
             }
         }
         best
