@@ -18,6 +18,8 @@ pub struct Contact {
     pub conductance_sigma_s: f32,
     /// Conductance of it in series with the current that crowds under it (S): of a firm contact readings give that far better.
     pub apparent_conductance_s: f32,
+    /// Force (N), where the table has a law of force.
+    pub force_n: Option<f32>,
     /// Radius (m), as far as the readings tell it; else the usual one.
     pub radius_m: f32,
     /// Standard error of the radius (m).
@@ -39,13 +41,15 @@ impl Flags {
     pub const MISFIT: Self = Self(2);
     /// Readings are at the end of the converter's range, or contacts conduct so well that more would change nothing.
     pub const SATURATED: Self = Self(4);
+    /// Wires of electrodes are broken; these are left out.
+    pub const FAULT: Self = Self(8);
 
     /// Whether all of some flags are raised.
     pub const fn has(self, flags: Self) -> bool {
         self.0 & flags.0 == flags.0
     }
 
-    /// As bits: 1 more, 2 misfit, 4 saturated.
+    /// As bits: 1 more, 2 misfit, 4 saturated, 8 fault.
     pub const fn bits(self) -> u8 {
         self.0
     }
@@ -64,6 +68,8 @@ pub struct Answer {
     pub flags: Flags,
     /// Root mean square of what is left of the readings, in standard deviations of the noise and the table's own error.
     pub residual: f32,
+    /// Electrodes that are left out, since their wires are broken: a bit each.
+    pub left_out: u32,
     /// What it took.
     pub work: Work,
 }

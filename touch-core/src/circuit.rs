@@ -20,7 +20,7 @@
 
 use crate::head::Head;
 use crate::normal::PARAMETERS;
-use crate::table::{MAX_ELECTRODES, Sample, Table};
+use crate::table::{LEAST_SHARE, MAX_ELECTRODES, Sample, Table};
 
 /// Most contacts.
 pub const MAX_CONTACTS: usize = 3;
@@ -43,8 +43,6 @@ pub(crate) const TURNED: usize = 5;
 const FIRMEST_SHEETS: f32 = 300.0;
 /// Smallest resistance of a contact with its own field, in those of even current: with less, fields are no longer those of contacts.
 const LEAST_OHM: f32 = 0.8;
-/// Least share of a disc that is on the detector: a quarter has the middle in a corner.
-const LEAST_SHARE: f32 = 0.2;
 
 /// What is fitted of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -20,10 +20,16 @@ pub enum Says {
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'f> {
     /// Voltages (V).
-    pub volts: &'f [f32],
+    pub(crate) volts: &'f [f32],
     /// What each says; empty where all are voltages.
-    pub says: &'f [Says],
+    says: &'f [Says],
+    /// Electrodes that are left out, a bit each, of how many.
+    left_out: u32,
+    electrodes: usize,
 }
+
+/// Share of the drive that everything reaches when a broken wire is to be grounded: the host's.
+const UNGROUNDED: f32 = 0.97;
 
 /// Why a frame has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -48,9 +54,27 @@ pub enum FrameError {
 }
 
 impl<'f> Frame<'f> {
+    /// A frame of voltages (V), with what each says.
+    pub fn new(volts: &'f [f32], says: &'f [Says]) -> Self {
+        Self { volts, says, left_out: 0, electrodes: 0 }
+    }
+
     /// A frame whose readings are all voltages.
     pub fn of_volts(volts: &'f [f32]) -> Self {
-        Self { volts, says: &[] }
+        Self::new(volts, &[])
+    }
+
+    /// The frame without electrodes whose wires are broken, and which these are: while one is to be grounded, most others rise to the drive, for nothing is
+    /// grounded. Where that is so of most electrodes, it is no electrode's fault.
+    pub(crate) fn without_broken(self, table: &Table<'_>) -> (Self, u32) {
+        let (n, least_v) = (table.electrodes(), UNGROUNDED * table.head().drive_v);
+        let is_broken = |g: usize| {
+            let risen = (0..n).filter(|e| *e != g && self.touch_v(g * n + e) > least_v).count();
+            4 * risen > 3 * (n - 1)
+        };
+        let broken = (0..n).filter(|g| is_broken(*g)).fold(0u32, |broken, g| broken | 1 << g);
+        let left_out = if 2 * broken.count_ones() as usize > n { 0 } else { broken };
+        (Self { left_out, electrodes: n, ..self }, left_out)
     }
 
     /// Checks that it can be one of a table's detector.
@@ -71,6 +95,10 @@ impl<'f> Frame<'f> {
     }
 
     pub(crate) fn says_at(&self, index: usize) -> Says {
+        let is_out = |electrode: usize| self.left_out >> electrode & 1 == 1;
+        if self.left_out != 0 && (is_out(index / self.electrodes) || is_out(index % self.electrodes)) {
+            return Says::Nothing;
+        }
         self.says.get(index).copied().unwrap_or_default()
     }
 

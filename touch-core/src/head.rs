@@ -39,19 +39,45 @@ pub struct Head {
     pub sheet_s: f32,
     /// Conductivity at the top (S/m).
     pub top_s_per_m: f32,
+    /// Resistance of the current that crowds under a contact where nothing of it depends on the place, as the law of force has it (ohm).
+    pub constriction_ohm: f32,
+    /// Law of force: conductance of a contact that is pressed with 1 N, but for the resistance in series (S); 0 where no law is known.
+    pub force_s: f32,
+    /// Its exponent.
+    pub force_exponent: f32,
+    /// Its resistance in series (ohm).
+    pub force_ohm: f32,
+    /// Largest force that is told (N).
+    pub force_most_n: f32,
 }
 
 /// `8 / (3 pi^2)`: own field of a disc of even current on a deep layer of conductivity `s`, as a mean over it, over `1 / (s R)`.
 pub const EVEN_SPREADING: f64 = 8.0 / (3.0 * PI * PI);
 
+/// How many numbers those are.
+pub(crate) const NUMBERS: usize = 22;
+
 impl Head {
+    /// Force under a contact (N) of a conductance with the constriction (S); `None` where no law is known.
+    /// `S = a F^g / (1 + a F^g R)`, solved for `F`.
+    pub(crate) fn force_n(&self, conductance_s: f32) -> Option<f32> {
+        if self.force_s == 0.0 {
+            return None;
+        }
+        let most_s = self.force_s * libm::powf(self.force_most_n, self.force_exponent);
+        let held_s = conductance_s.max(0.0).min(most_s / (1.0 + most_s * self.force_ohm));
+        let own_s = held_s / (1.0 - held_s * self.force_ohm);
+        // Rounding may take the last of it beyond.
+        Some(libm::powf(own_s / self.force_s, 1.0 / self.force_exponent).min(self.force_most_n))
+    }
+
     /// Own field of a disc of even current on a deep layer (ohm).
     pub(crate) fn even_ohm(&self, radius_m: f32) -> f32 {
         EVEN_SPREADING as f32 / (self.top_s_per_m * radius_m)
     }
 
     /// Its numbers in the order in which they are stored.
-    pub fn numbers(&self) -> [f32; 17] {
+    pub fn numbers(&self) -> [f32; NUMBERS] {
         [
             self.left_m,
             self.bottom_m,
@@ -70,6 +96,11 @@ impl Head {
             self.full_v,
             self.sheet_s,
             self.top_s_per_m,
+            self.constriction_ohm,
+            self.force_s,
+            self.force_exponent,
+            self.force_ohm,
+            self.force_most_n,
         ]
     }
 
@@ -100,6 +131,11 @@ impl Head {
             full_v: next(),
             sheet_s: next(),
             top_s_per_m: next(),
+            constriction_ohm: next(),
+            force_s: next(),
+            force_exponent: next(),
+            force_ohm: next(),
+            force_most_n: next(),
         };
         head.check()
     }
@@ -107,6 +143,7 @@ impl Head {
     fn check(self) -> Result<Self, TableError> {
         let above = |value: f32| value > 0.0 && value.is_finite();
         let not_below = |value: f32| value >= 0.0 && value.is_finite();
+        let has_law = above(self.force_exponent) && not_below(self.force_ohm) && above(self.force_most_n);
         let all = [
             ("place", self.left_m.is_finite() && self.bottom_m.is_finite()),
             ("step of the grid", above(self.step_x_m) && above(self.step_y_m)),
@@ -121,6 +158,8 @@ impl Head {
             ("full scale", above(self.full_v)),
             ("sheet conductance", above(self.sheet_s)),
             ("conductivity", above(self.top_s_per_m)),
+            ("constriction", above(self.constriction_ohm)),
+            ("law of force", not_below(self.force_s) && (self.force_s == 0.0 || has_law)),
         ];
         match all.iter().find(|(_, sound)| !sound) {
             Some((what, _)) => Err(TableError::Number { what }),

@@ -58,6 +58,11 @@ pub(crate) fn table() -> Vec<u8> {
         full_v: 1.99,
         sheet_s: 1.1e-3,
         top_s_per_m: 0.23,
+        constriction_ohm: 560.0,
+        force_s: 2e-4,
+        force_exponent: 1.2,
+        force_ohm: 400.0,
+        force_most_n: 20.0,
     };
     let mut pads_ohm = Vec::new();
     for e in 0..n {

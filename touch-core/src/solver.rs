@@ -107,6 +107,8 @@ impl Solver {
         attend: &mut dyn FnMut(),
     ) -> Result<Answer, FrameError> {
         frame.check(table)?;
+        let (frame, left_out) = frame.without_broken(table);
+        let frame = &frame;
         let task = Task { table, frame, errors: &Errors::of(frame, table) };
         let mut work = Working::new(attend);
         let before = self.scene;
@@ -133,7 +135,10 @@ impl Solver {
         }
         self.scene = found.map_or_else(Scene::default, |fit| fit.scene);
         self.number(&before);
-        Ok(self.answer(found, task, work.done))
+        let mut answer = self.answer(found, task, work.done);
+        answer.left_out = left_out;
+        answer.flags.raise(Flags::FAULT, left_out != 0);
+        Ok(answer)
     }
 
     fn may_search(&mut self) -> bool {
@@ -330,13 +335,15 @@ impl Solver {
         let [x, y, log_radius] = [0, 1, 3].map(|i| libm::sqrtf(of(i, i).max(0.0)));
         let variance = loaded.conductance_variance(table, radius_m, of);
         let conductance_s = loaded.conductance_s();
+        let apparent_conductance_s = 1.0 / (loaded.share * loaded.ohm);
         Contact {
             id: self.ids[k],
             x_m: loaded.spot.at_m[0],
             y_m: loaded.spot.at_m[1],
             conductance_s,
             conductance_sigma_s: conductance_s * libm::sqrtf(variance),
-            apparent_conductance_s: 1.0 / (loaded.share * loaded.ohm),
+            apparent_conductance_s,
+            force_n: table.force_n(loaded.spot.at_m, apparent_conductance_s),
             radius_m: loaded.radius_m,
             radius_sigma_m: loaded.radius_m * log_radius,
             sigma_m: [radius_m * x, radius_m * y],

@@ -14,8 +14,8 @@
 //! | 14 | u16 | zero |
 //! | 16 | u32 | bytes of the whole table |
 //! | 20 | u32 | CRC-32 of the electrodes' places, three `f32` each (m): tables of another layout have another |
-//! | 24 | 17 f32 | [`Head`], in the order of its fields |
-//! | 92 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
+//! | 24 | 22 f32 | [`Head`], in the order of its fields |
+//! | 112 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
 //! | | 2 n f32 | of each channel the gain, and what it reads too much though at rest it does not show (V) |
 //! | | k f32 | coefficients of the spline `d` of `N` by distance (ohm), over `ln r` |
 //! | | (n + 1)(n + 2) / 2 f32 | `Q`, symmetric, as the fields above (1/ohm, none, ohm) |
@@ -33,13 +33,14 @@
 //! make, which is smooth.
 
 use crate::crc::crc32;
+use crate::head::NUMBERS;
 pub use crate::head::{EVEN_SPREADING, Head};
 use crate::spline::{interval, weights};
 
 /// First bytes of a table.
 pub const MAGIC: [u8; 4] = *b"TCtb";
 /// Version of the format.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Most electrodes.
 pub const MAX_ELECTRODES: usize = 32;
 /// Most coefficients along a side.
@@ -51,9 +52,11 @@ pub const OTHERS: usize = 2;
 /// Radii that quantities are stored for.
 pub const RADII: usize = 2;
 
-const HEAD: usize = 92;
+const HEAD: usize = 24 + 4 * NUMBERS;
 /// Where the table's length stands.
 const LENGTH_AT: usize = 16;
+/// Least share of a disc that is on the detector: a quarter has the middle in a corner.
+pub(crate) const LEAST_SHARE: f32 = 0.2;
 const QUANTITIES: usize = MAX_ELECTRODES + OTHERS;
 
 /// Why bytes are no table.
@@ -240,7 +243,7 @@ impl<'a> Table<'a> {
         let cut = || TableError::Length { found: bytes.len(), expected };
         let mut parts = Parts(bytes);
         parts.bytes(24).ok_or_else(cut)?;
-        let head = Head::read(parts.floats(17).ok_or_else(cut)?)?;
+        let head = Head::read(parts.floats(NUMBERS).ok_or_else(cut)?)?;
         let table = Self {
             head,
             layout: u32_at(20),
@@ -387,6 +390,36 @@ impl<'a> Table<'a> {
         };
         (0..self.electrodes).for_each(|e| fields_ohm[e] = mean(e));
         mean(self.electrodes) + self.head.even_ohm(self.head.radius_m)
+    }
+
+    /// Force under a contact (N), of its place and of its conductance as readings tell it, with the current that crowds under it (S); `None` where no law of
+    /// force is known. What of the resistance depends on the place is taken off first.
+    pub fn force_n(&self, at_m: [f32; 2], apparent_conductance_s: f32) -> Option<f32> {
+        let head = self.head();
+        let [own_ohm, share] = self.own(at_m);
+        let ohm = 1.0 / (share.clamp(LEAST_SHARE, 1.0) * apparent_conductance_s);
+        // Less than nothing is left of a contact that is wide and firm.
+        let own_ohm = (ohm - own_ohm - head.even_ohm(head.radius_m) + head.constriction_ohm).max(f32::MIN_POSITIVE);
+        head.force_n(1.0 / own_ohm)
+    }
+
+    /// The own field of a disc of the usual radius at a place (ohm) but for that on a deep layer, and the share of it that is on the detector.
+    fn own(&self, [x_m, y_m]: [f32; 2]) -> [f32; 2] {
+        let ([i, j], [x, y]) = self.cell(x_m, y_m);
+        let (along_x, along_y) = (weights(x).value, weights(y).value);
+        let [small_m2, wide_m2] = self.head.radii_m.map(|radius_m| radius_m * radius_m);
+        let wide = (self.head.radius_m * self.head.radius_m - small_m2) / (wide_m2 - small_m2);
+        let mut own = [0.0; OTHERS];
+        for (row, column) in (0..4).flat_map(|row| (0..4).map(move |column| (row, column))) {
+            let codes = self.coefficient(i + column, j + row);
+            for (other, own) in own.iter_mut().enumerate() {
+                let of = |quantity: usize| codes.get(quantity).map_or(0.0, |code| self.decoded(quantity, *code));
+                let quantity = self.electrodes + other;
+                let [small, large] = [of(quantity), of(quantity + self.electrodes + OTHERS)];
+                *own += along_x[column] * along_y[row] * (small + wide * (large - small));
+            }
+        }
+        own
     }
 
     /// The middle of a cell (m).

@@ -58,7 +58,7 @@ impl<const READINGS: usize> Cells<READINGS> {
             self.rest.restart();
         }
         let (volts, says) = (self.touch_v.get(..n * n)?, self.says.get(..n * n)?);
-        Some(Frame { volts, says })
+        Some(Frame::new(volts, says))
     }
 
     /// Whether readings at rest are known.

@@ -135,6 +135,11 @@ impl ForceLaw {
         self.maximum_n.unwrap_or(self.range_n[1])
     }
 
+    /// The largest force that is told (N), some way beyond that.
+    pub fn farthest_n(&self) -> f64 {
+        FARTHEST * self.limit_n()
+    }
+
     /// `FMAX` (N), where nine tenths of the saturation are reached; `None` of a law that does not saturate.
     pub fn fmax_n(&self) -> Option<f64> {
         self.fmax_with_n(SATURATED_SHARE / (1.0 - SATURATED_SHARE))
@@ -221,7 +226,7 @@ impl ForceLaw {
 
     /// The force by the law, held at the farthest that is given (N).
     fn held_force_n(&self, conductance_s: f64) -> f64 {
-        let held_s = conductance_s.min(self.conductance_s(FARTHEST * self.limit_n()));
+        let held_s = conductance_s.min(self.conductance_s(self.farthest_n()));
         let own_s = held_s / (1.0 - held_s * self.series_ohm.unwrap_or(0.0));
         (own_s / self.conductance_at_1_n_s).powf(self.exponent.recip())
     }

@@ -1,6 +1,7 @@
 //! What solvers are made for.
 
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread;
@@ -190,6 +191,14 @@ impl Problem {
     /// Radius of contacts that is usual (m), a fingertip's: a sixth of the mean distance of electrodes.
     pub fn usual_radius_m(&self) -> f64 {
         self.spacing_m() / 6.0
+    }
+
+    /// Resistance of the current that crowds under a disc of the usual radius on a bare layer (ohm): on a half space, and of a sheet from there to `e` times
+    /// as far.
+    pub(crate) fn constriction_ohm(&self) -> Option<f64> {
+        let (detector, radius_m) = (self.detector(), self.usual_radius_m());
+        let top_s_per_m = detector.layers.last()?.top_s_per_m;
+        Some(1.0 / (4.0 * top_s_per_m * radius_m) + 1.0 / (TAU * detector.sheet_conductance_s()))
     }
 
     /// The problem through some of its electrodes, in this order, with some of all its electrodes joined. Joined electrodes are one:

@@ -10,8 +10,6 @@
 //! What is left is the contact's own and a constriction that is the same everywhere, `1 / (4 sigma r) + 1 / (2 pi sigma t)`: that of a disc on a half
 //! space, and of a sheet from there to `e` times as far. It only has to be about right, for a law of force has a resistance in series.
 
-use std::f64::consts::PI;
-
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2};
 
 use crate::solve::answer::FoundContact;
@@ -70,11 +68,10 @@ impl Meter {
     pub fn new(problem: &Problem) -> Option<Self> {
         let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
         let sheet_s = detector.sheet_conductance_s();
-        let top_s_per_m = detector.layers.last()?.top_s_per_m;
         Some(Self {
             spot_model: SpotModel::new(detector, problem.model.electrode_fields_ohm()),
             fields: problem.model.spots(radius_m)?,
-            constriction_ohm: 1.0 / (4.0 * top_s_per_m * radius_m) + 1.0 / (2.0 * PI * sheet_s),
+            constriction_ohm: problem.constriction_ohm()?,
             sheet_s,
             noise_v: detector.adc.deviation_v(),
             full_v: full_v(detector),

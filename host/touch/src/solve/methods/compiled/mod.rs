@@ -64,7 +64,7 @@ impl Solver for Compiled {
         let wrong = SolveError::Electrodes { found: readings.electrodes(), expected: self.electrodes };
         // It was read, and checked, when it was compiled.
         let table = Table::read_again(&self.bytes).map_err(|_| wrong.clone())?;
-        match self.core.solve(&table, &Frame { volts: &volts, says: &says }) {
+        match self.core.solve(&table, &Frame::new(&volts, &says)) {
             Ok(answer) => Ok(solution(&answer)),
             Err(FrameError::NotFinite { g, e }) => Err(SolveError::NotFinite { g, e }),
             Err(_) => Err(wrong),

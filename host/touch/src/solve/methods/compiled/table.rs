@@ -6,6 +6,7 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
+use tactomo_physics::detector::ForceLaw;
 use tactomo_physics::forward::{ForwardError, readings_v};
 use tactomo_physics::scene::Contact;
 use tactomo_touch_core::Contents;
@@ -239,6 +240,9 @@ fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
 
 fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
     let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
+    let constriction_ohm = constriction_ohm(problem);
+    let law = detector.force.as_ref().filter(|_| constriction_ohm.is_some());
+    let of_law = |value: fn(&ForceLaw) -> f64| law.map_or(0.0, value) as f32;
     Head {
         left_m: grid.low_m[0] as f32,
         bottom_m: grid.low_m[1] as f32,
@@ -256,7 +260,33 @@ fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
         full_v: full_v(detector) as f32,
         sheet_s: detector.sheet_conductance_s() as f32,
         top_s_per_m: top_s_per_m(problem) as f32,
+        constriction_ohm: constriction_ohm.unwrap_or(1.0) as f32,
+        force_s: of_law(|law| law.conductance_at_1_n_s),
+        force_exponent: of_law(|law| law.exponent),
+        force_ohm: of_law(|law| law.series_ohm.unwrap_or(0.0)),
+        force_most_n: of_law(ForceLaw::farthest_n),
     }
+}
+
+/// The constriction that makes conductances, less a disc's own field here, those that the host's meter finds with a spot's own field there (ohm). Both fields are
+/// in the gauge in which the electrodes' mean is zero.
+fn constriction_ohm(problem: &Problem) -> Option<f64> {
+    let radius_m = problem.usual_radius_m();
+    let [x_m, y_m] = tried_m(problem).next()?;
+    let spot = problem.model.spots(radius_m)?.spot([x_m, y_m, 0.0]);
+    let count = spot.electrodes_ohm.len() as f64;
+    let spot_ohm = spot.own_ohm - 2.0 * spot.electrodes_ohm.iter().sum::<f64>() / count;
+    let beyond_even_ohm = *of_disc(problem, [x_m, y_m], radius_m).ok()?.get(spot.electrodes_ohm.len())?;
+    let disc_ohm = beyond_even_ohm + EVEN_SPREADING / (top_s_per_m(problem) * radius_m);
+    Some(problem.constriction_ohm()? - (spot_ohm - disc_ohm))
+}
+
+/// Places that stand for all of a detector (m).
+fn tried_m(problem: &Problem) -> impl Iterator<Item = [f64; 2]> {
+    let outline = &problem.detector().outline;
+    let [low_m, high_m] = outline.bounds();
+    let at = move |share: [f64; 2]| [0, 1].map(|axis| low_m[axis] + share[axis] * (high_m[axis] - low_m[axis]));
+    TRIED.into_iter().map(at).filter(|place_m| outline.holds(*place_m))
 }
 
 /// What readings of contacts are off by as nobody knows the detector exactly: root mean square over readings and contacts at some places, as a share of the largest
@@ -264,10 +294,7 @@ fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
 fn detector_share(problem: &Problem) -> f64 {
     let Some(nuisance) = problem.nuisance() else { return 0.0 };
     let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
-    let [low_m, high_m] = detector.outline.bounds();
-    let at = |share: [f64; 2]| [0, 1].map(|axis| low_m[axis] + share[axis] * (high_m[axis] - low_m[axis]));
-    let places_m = TRIED.map(at).into_iter().filter(|place_m| detector.outline.holds(*place_m));
-    let squares = places_m.filter_map(|[x_m, y_m]| {
+    let squares = tried_m(problem).filter_map(|[x_m, y_m]| {
         let contacts = [Contact::flat(x_m, y_m, radius_m, detector.sheet_conductance_s())];
         let readings = readings_v(&problem.model.impedance_ohm(&contacts).ok()?, detector);
         let patterns_v = nuisance.patterns_v(&contacts, detector).ok()?;

@@ -1,6 +1,6 @@
 use super::*;
 use crate::solve::pipeline::method::Method;
-use tactomo_physics::detector::{Detector, electrode_grid};
+use tactomo_physics::detector::{Detector, ForceLaw, electrode_grid};
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::scene::Contact as Disc;
 use tactomo_physics::simulate::{Noise, measured};
@@ -112,6 +112,34 @@ fn standard_errors_are_about_those_of_many_frames() {
     let mean = squares.map(|[x, y]| 0.5 * (x + y)).sum::<f64>() / f64::from(frames);
     // The frame that the others are made of has noise of its own.
     assert!((0.4..4.0).contains(&mean), "{mean}");
+}
+
+#[test]
+fn a_board_tells_the_newtons_of_the_host() {
+    let law = ForceLaw {
+        conductance_at_1_n_s: 1e-3,
+        exponent: 1.3,
+        series_ohm: Some(500.0),
+        range_n: [0.1, 5.0],
+        ..ForceLaw::siemens()
+    };
+    let problem = Problem::of(&Detector { force: Some(law), ..detector() }).unwrap();
+    let bytes = compile(&problem).unwrap();
+    let table = Table::read(&bytes).unwrap();
+    let mut solver = Method::Core.build(&problem).unwrap();
+    let mut noise = Noise::new(3);
+    // Light and firm, in the middle, at a wall and towards a corner.
+    for (x_m, y_m) in [(0.004, -0.011), (-0.022, 0.003), (0.015, 0.015)] {
+        for sheets in [0.03, 0.3, 3.0] {
+            solver.reset();
+            let solution = solver.solve(&touched(&[disc(x_m, y_m, 0.0025, sheets)], &mut noise)).unwrap();
+            let [found] = &solution.contacts[..] else { panic!("{solution:?}") };
+            let at_m = [found.x_m as f32, found.y_m as f32];
+            let board_n = table.force_n(at_m, found.apparent_conductance_s.unwrap() as f32).unwrap();
+            let apart = (f64::from(board_n) / found.force_n.unwrap()).ln();
+            assert!(apart.abs() < 0.05, "{x_m} {y_m} {sheets}: {board_n} N, {:?} N", found.force_n);
+        }
+    }
 }
 
 #[test]
