@@ -393,14 +393,18 @@ impl<'a> Table<'a> {
     }
 
     /// Force under a contact (N), of its place and of its conductance as readings tell it, with the current that crowds under it (S); `None` where no law of
-    /// force is known. What of the resistance depends on the place is taken off first.
+    /// force is known.
     pub fn force_n(&self, at_m: [f32; 2], apparent_conductance_s: f32) -> Option<f32> {
+        self.head.force_n(self.constricted_conductance_s(at_m, apparent_conductance_s))
+    }
+
+    /// What a law of force is of (S): the conductance as readings tell it less what of its resistance depends on the place.
+    pub fn constricted_conductance_s(&self, at_m: [f32; 2], apparent_conductance_s: f32) -> f32 {
         let head = self.head();
         let [own_ohm, share] = self.own(at_m);
         let ohm = 1.0 / (share.clamp(LEAST_SHARE, 1.0) * apparent_conductance_s);
         // Less than nothing is left of a contact that is wide and firm.
-        let own_ohm = (ohm - own_ohm - head.even_ohm(head.radius_m) + head.constriction_ohm).max(f32::MIN_POSITIVE);
-        head.force_n(1.0 / own_ohm)
+        1.0 / (ohm - own_ohm - head.even_ohm(head.radius_m) + head.constriction_ohm).max(f32::MIN_POSITIVE)
     }
 
     /// The own field of a disc of the usual radius at a place (ohm) but for that on a deep layer, and the share of it that is on the detector.

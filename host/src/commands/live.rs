@@ -19,7 +19,7 @@ use tactomo::run::Listener;
 use tactomo::run::calibration::Learning;
 use tactomo::run::options::{RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::table::WithTable;
+use tactomo::run::table::{BoardTable, WithTable};
 use tactomo::scene::SceneName;
 use tactomo::sink::address::Address;
 use tactomo::sink::door::{Door, Origin};
@@ -162,6 +162,8 @@ pub struct Show {
     pub scan: ScanChoice,
     /// What the board is asked to send.
     pub output: Output,
+    /// The table that it finds contacts by, if it does.
+    pub table: BoardTable,
     /// How the detector is learned, if it is; a recording is taken as it was.
     pub learning: Option<Learning>,
     /// Time from Hello to the end.
@@ -202,7 +204,11 @@ fn prepared(args: Args) -> anyhow::Result<Show> {
         None => source::board(&args.board, &detector)?,
     };
     let output = args.board_sends;
-    let source = if output.has_contacts() { Box::new(WithTable::new(source, detector.clone())) } else { source };
+    let table = BoardTable::default();
+    let source = match output.has_contacts() {
+        true => Box::new(WithTable::new(source, detector.clone(), table.clone())),
+        false => source,
+    };
     let settings = args.board.settings.requested();
     let is_pointer = args.board.scene.scene == Some(SceneName::Pointer);
     let Args { mut picture, scan, seconds, record, streams, elf, .. } = args;
@@ -218,6 +224,7 @@ fn prepared(args: Args) -> anyhow::Result<Show> {
         settings,
         scan,
         output,
+        table,
         learning,
         detector,
         picture,
@@ -299,6 +306,7 @@ fn options(
         settings: show.settings,
         scan: show.scan.clone(),
         output: show.output,
+        table: show.table.clone(),
         solving: Some(if show.output.has_frames() { solving } else { solving.on_board() }),
         recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
         begin_recording: Some(keep::on_request(detector.clone(), show.source.name(), name)),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use tactomo::board::session::RequestedSettings;
 use tactomo::run::scanning::ScanChoice;
+use tactomo::run::table::BoardTable;
 use tactomo_protocol::Output;
 
 use super::live::{self, PictureArgs, Show};
@@ -43,6 +44,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         finger: None,
         picture: args.picture,
         scan: ScanChoice::Whole,
+        table: BoardTable::default(),
         output: Output::default(),
         learning: None,
         settings: RequestedSettings::default(),

@@ -12,6 +12,7 @@ use tokio::sync::watch;
 use super::calibration::{LearnedInUse, Learning};
 use super::found::OnBoard;
 use super::scanning::ScanChoice;
+use super::table::BoardTable;
 use super::{Latency, Listener, Order, Request, Snapshot};
 use tactomo_board::baseline::BaselineTracker;
 use tactomo_board::board_log::BoardLog;
@@ -50,6 +51,8 @@ pub struct RunOptions {
     pub scan: ScanChoice,
     /// What the board is asked to send.
     pub output: Output,
+    /// The table that it finds contacts by, if it does.
+    pub table: BoardTable,
     /// What reads the touch; `None` only receives.
     pub solving: Option<Solving>,
     /// Keeps the bytes.
@@ -81,6 +84,7 @@ impl RunOptions {
             settings: RequestedSettings::default(),
             scan: ScanChoice::default(),
             output: Output::default(),
+            table: BoardTable::default(),
             solving: None,
             recorder: None,
             ring: None,

@@ -25,7 +25,7 @@ use super::course::Course;
 use super::follower::FollowThread;
 use super::found;
 use super::frame::{Arrival, Frame, NewestReadings, Rows};
-use super::inbox::{Event, Inbox, Taken};
+use super::inbox::{Event, Found, Inbox, Taken};
 use super::notice::NoticeBoard;
 use super::options::{Ends, LiveError, RunOptions, Summary};
 use super::recordings::Recordings;
@@ -245,7 +245,8 @@ impl Reader {
             return;
         }
         let is_its = |contacts: &mut Contacts| contacts.head.sequence == frame.head.sequence;
-        let found = self.found.take_if(is_its).map(|contacts| found::found(&contacts, true));
+        let contacts = self.found.take_if(is_its);
+        let found = contacts.map(|contacts| self.found_on_board(&contacts, true));
         let used = board.volts.used(measured.clone());
         let (measured, used, rows) = match frame.scope.is_whole() {
             true => {
@@ -310,7 +311,16 @@ impl Reader {
             lost: self.frames_lost,
             ..first
         };
-        self.inbox.put_frame(Taken::new(frame, Vec::new(), Some(found::found(contacts, false))), board.noise_v);
+        let found = self.found_on_board(contacts, false);
+        self.inbox.put_frame(Taken::new(frame, Vec::new(), Some(found)), board.noise_v);
+    }
+
+    fn found_on_board(&self, contacts: &Contacts, has_readings: bool) -> Found {
+        let mut found = found::found(contacts, has_readings);
+        if let Some(law) = &self.options.detector.force {
+            self.options.table.add_newtons(law, &mut found.solution.contacts);
+        }
+        found
     }
 
     fn is_timed_out(&self) -> bool {

@@ -1,5 +1,6 @@
 //! A board that finds contacts by itself: it is given the table of its detector before it is asked for them.
 
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tactomo_board::link::Link;
@@ -7,10 +8,10 @@ use tactomo_board::measured::{self, Mismatch};
 use tactomo_board::session::{self, GreetError};
 use tactomo_board::source::{Source, SourceError};
 use tactomo_board::table::{self, TableError};
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Detector, ForceLaw};
 use tactomo_physics::forward::ForwardError;
 use tactomo_protocol::{Hello, TableId};
-use tactomo_touch::solve::{CompileError, Problem, compile};
+use tactomo_touch::solve::{self, CompileError, FoundContact, Problem, compile};
 
 /// How long a board has to say Hello.
 const PATIENCE: Duration = Duration::from_secs(6);
@@ -47,8 +48,8 @@ pub enum GiveTableError {
 pub struct Given {
     /// The board.
     pub hello: Hello,
-    /// Bytes of the table.
-    pub bytes: usize,
+    /// The table.
+    pub bytes: Vec<u8>,
     /// Which table it is.
     pub table: TableId,
     /// Whether it had to be sent.
@@ -72,7 +73,7 @@ pub fn give(link: &mut dyn Link, what: &What, mut progress: impl FnMut(usize, us
         is_sent = true;
         progress(at, bytes.len());
     })?;
-    Ok(Given { hello, bytes: bytes.len(), table, is_sent })
+    Ok(Given { hello, bytes, table, is_sent })
 }
 
 /// What a board is to find contacts by.
@@ -84,16 +85,33 @@ pub enum What {
     Table(Vec<u8>),
 }
 
+/// The table that a board was given last, for those who read what it finds.
+#[derive(Clone, Debug, Default)]
+pub struct BoardTable(Arc<Mutex<Vec<u8>>>);
+
+impl BoardTable {
+    fn put(&self, bytes: Vec<u8>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = bytes;
+    }
+
+    /// Adds newtons to contacts that the board has found.
+    pub(super) fn add_newtons(&self, law: &ForceLaw, contacts: &mut [FoundContact]) {
+        // It was checked when it was given; there is none of what was recorded.
+        solve::add_newtons(&self.0.lock().unwrap_or_else(PoisonError::into_inner), law, contacts);
+    }
+}
+
 /// A source whose board has the table of a detector, each time that it is opened.
 pub struct WithTable {
     source: Box<dyn Source>,
     what: What,
+    table: BoardTable,
 }
 
 impl WithTable {
-    /// A board on `source` that finds contacts on a detector.
-    pub fn new(source: Box<dyn Source>, detector: Detector) -> Self {
-        Self { source, what: What::Detector(Box::new(detector)) }
+    /// A board on `source` that finds contacts on a detector; its table is put in `table`.
+    pub fn new(source: Box<dyn Source>, detector: Detector, table: BoardTable) -> Self {
+        Self { source, what: What::Detector(Box::new(detector)), table }
     }
 }
 
@@ -106,8 +124,9 @@ impl Source for WithTable {
         let mut link = self.source.open()?;
         let given = give(&mut *link, &self.what, |_, _| {}).map_err(|error| SourceError::Prepared(Box::new(error)))?;
         if given.is_sent {
-            tracing::info!("{}: a table of {} bytes was sent to the board", link.name(), given.bytes);
+            tracing::info!("{}: a table of {} bytes was sent to the board", link.name(), given.bytes.len());
         }
+        self.table.put(given.bytes);
         Ok(link)
     }
 

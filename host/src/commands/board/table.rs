@@ -57,6 +57,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     };
     let Given { hello, bytes, table, is_sent } = give(&mut *link, &what, progress)?;
     bar.into_iter().for_each(ProgressBar::end);
+    let bytes = bytes.len();
     let told = Told {
         source: &name,
         board: &hello.board,

@@ -17,6 +17,7 @@ use crate::solve::fit::policy;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
 use tactomo_physics::causes::with_causes;
+use tactomo_physics::detector::ForceLaw;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::{Readings, Says};
 
@@ -73,6 +74,19 @@ impl Solver for Compiled {
 
     fn reset(&mut self) {
         self.core.reset();
+    }
+}
+
+/// Adds newtons to contacts that a board has found by a table, and none if these bytes are no table.
+pub fn add_newtons(table: &[u8], law: &ForceLaw, contacts: &mut [FoundContact]) {
+    let Ok(table) = Table::read_again(table) else { return };
+    for contact in contacts {
+        let at_m = [contact.x_m, contact.y_m].map(|m| m as f32);
+        let apparent_s = contact.apparent_conductance_s.unwrap_or(contact.conductance_s) as f32;
+        let newtons = law.force_n(table.constricted_conductance_s(at_m, apparent_s).into(), 0.0);
+        contact.force_n = Some(newtons.force_n);
+        contact.force_deviation_n = Some(newtons.deviation_n);
+        contact.force_beyond_maximum = Some(newtons.beyond_maximum);
     }
 }
 

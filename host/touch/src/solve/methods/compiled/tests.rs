@@ -134,10 +134,14 @@ fn a_board_tells_the_newtons_of_the_host() {
             solver.reset();
             let solution = solver.solve(&touched(&[disc(x_m, y_m, 0.0025, sheets)], &mut noise)).unwrap();
             let [found] = &solution.contacts[..] else { panic!("{solution:?}") };
-            let at_m = [found.x_m as f32, found.y_m as f32];
+            let at_m = [found.x_m, found.y_m].map(|m| m as f32);
             let board_n = table.force_n(at_m, found.apparent_conductance_s.unwrap() as f32).unwrap();
-            let apart = (f64::from(board_n) / found.force_n.unwrap()).ln();
-            assert!(apart.abs() < 0.05, "{x_m} {y_m} {sheets}: {board_n} N, {:?} N", found.force_n);
+            let mut received = [*found];
+            add_newtons(&bytes, problem.detector().force.as_ref().unwrap(), &mut received);
+            for newtons in [board_n.into(), received[0].force_n.unwrap()] {
+                let apart = (newtons / found.force_n.unwrap()).ln();
+                assert!(apart.abs() < 0.05, "{x_m} {y_m} {sheets}: {newtons} N, {:?} N", found.force_n);
+            }
         }
     }
 }
