@@ -57,7 +57,10 @@ impl Normal {
                 let index = g * n + e;
                 let Some(left_v) = left_v(frame, index, head.full_v, volts[e]) else { continue };
                 let mut slope = [0.0; MOST];
-                slopes.of_reading(circuit, e, volts[e] / head.drive_v, &mut slope);
+                for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+                    let pattern = Pattern::of(one, head.radius_m, |values| values[e]);
+                    slopes.add(circuit, k, &pattern, 1.0 - volts[e] / head.drive_v, &mut slope);
+                }
                 let by_pad_v = errors.pad_v(table, frame, g, e);
                 self.cost += left_v * left_v;
                 left_by_pad += left_v * by_pad_v;
@@ -128,8 +131,8 @@ impl Normal {
 }
 
 /// What the derivatives by a contact's parameters need of an electrode: numbers that are linear in the electrodes, so that a sum over these will do too.
-#[derive(Clone, Copy, Default)]
-struct Pattern {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pattern {
     current: f32,
     /// Changes of the field at the contact for a step of its place along x and along y, in usual radii, and of its radius' logarithm (ohm).
     along: [f32; 3],
@@ -138,8 +141,10 @@ struct Pattern {
 }
 
 impl Pattern {
+    pub const NONE: Self = Self { current: 0.0, along: [0.0; 3], driving: [0.0; 2], turned: [0.0; TURNED] };
+
     /// Of a contact, summed over electrodes by `sum`.
-    fn of(one: &Loaded, unit_m: f32, sum: impl Fn(&PerElectrode) -> f32) -> Self {
+    pub fn of(one: &Loaded, unit_m: f32, sum: impl Fn(&PerElectrode) -> f32) -> Self {
         let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| unit_m * sum(slopes));
         Self {
             current: sum(&one.currents),
@@ -147,6 +152,14 @@ impl Pattern {
             driving: one.driving_ohm_per_m.each_ref().map(&sum),
             turned: one.turned.each_ref().map(&sum),
         }
+    }
+
+    /// Adds so much of another.
+    pub fn add(&mut self, share: f32, other: &Self) {
+        self.current += share * other.current;
+        self.along.iter_mut().zip(other.along).for_each(|(sum, along)| *sum += share * along);
+        self.driving.iter_mut().zip(other.driving).for_each(|(sum, driving)| *sum += share * driving);
+        self.turned.iter_mut().zip(other.turned).for_each(|(sum, turned)| *sum += share * turned);
     }
 
     /// Derivatives of the impedance between two electrodes by the parameters (ohm).
@@ -168,11 +181,10 @@ impl Pattern {
 }
 
 /// What the derivatives of a row's readings have in common.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct RowSlopes {
     /// Volts by ohm.
     per_ohm: f32,
-    /// Places are in usual radii (m).
-    unit_m: f32,
     /// Of each contact at the grounded electrode.
     own: [Pattern; MAX_CONTACTS],
     /// Change of the load by each parameter (ohm).
@@ -180,9 +192,11 @@ pub(crate) struct RowSlopes {
 }
 
 impl RowSlopes {
+    pub const NONE: Self = Self { per_ohm: 0.0, own: [Pattern::NONE; MAX_CONTACTS], own_ohm: [0.0; MOST] };
+
+    /// Of the row of a grounded electrode; places are in `unit_m`.
     pub fn new(circuit: &Circuit, g: usize, drive_v: f32, unit_m: f32) -> Self {
-        let own = [Pattern::default(); MAX_CONTACTS];
-        let mut all = Self { per_ohm: -drive_v / circuit.loads_ohm[g], unit_m, own, own_ohm: [0.0; MOST] };
+        let mut all = Self { per_ohm: -drive_v / circuit.loads_ohm[g], ..Self::NONE };
         for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
             all.own[k] = Pattern::of(one, unit_m, |values| values[g]);
             let changes_ohm = all.own[k].changes_ohm(&all.own[k], one);
@@ -191,24 +205,13 @@ impl RowSlopes {
         all
     }
 
-    /// Derivatives of a reading, of which `share` of the drive is predicted.
-    fn of_reading(&self, circuit: &Circuit, e: usize, share: f32, slope: &mut Vector) {
-        self.add(circuit, 1.0 - share, |values| values[e], slope);
-    }
-
-    /// Adds to `products` those of the row's derivatives with some volts, by what of the drive is predicted at each electrode.
-    pub fn add_products(&self, circuit: &Circuit, volts: &[f32], shares: &[f32], products: &mut Vector) {
-        let of_load = volts.iter().zip(shares).map(|(volts, share)| volts * (1.0 - share)).sum();
-        self.add(circuit, of_load, |values| volts.iter().zip(values).map(|(a, b)| a * b).sum(), products);
-    }
-
-    fn add(&self, circuit: &Circuit, of_load: f32, sum: impl Fn(&PerElectrode) -> f32, slope: &mut Vector) {
-        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-            let first = PARAMETERS * k;
-            let changes_ohm = Pattern::of(one, self.unit_m, &sum).changes_ohm(&self.own[k], one);
-            for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
-                slope[first + i] += self.per_ohm * (change_ohm - of_load * self.own_ohm[first + i]);
-            }
+    /// Adds the derivatives of a reading, or of a sum of readings, by the parameters of a contact: of those of which `pattern` is the contact's, and `of_load` what of
+    /// the drive is not predicted at them.
+    pub fn add(&self, circuit: &Circuit, k: usize, pattern: &Pattern, of_load: f32, slope: &mut Vector) {
+        let first = PARAMETERS * k;
+        let changes_ohm = pattern.changes_ohm(&self.own[k], &circuit.loaded[k]);
+        for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
+            slope[first + i] += self.per_ohm * (change_ohm - of_load * self.own_ohm[first + i]);
         }
     }
 }

@@ -4,10 +4,10 @@
 //! Loads are had from the readings alone but for a factor, as `Z` is symmetric: `r[g][e] D[g] = r[e][g] D[e]` with `r = 1 - V / Vcc`. So the
 //! scalar product with the pattern of a place is a sum over electrodes, and a look costs some dozen multiplications.
 
-use crate::circuit::{Circuit, PerElectrode, Spot};
+use crate::circuit::{Circuit, MAX_CONTACTS, PerElectrode, Spot};
 use crate::fit::{Working, held_ohm};
 use crate::frame::{Errors, Frame, left_v};
-use crate::normal::{Factor, MOST, Normal, RowSlopes};
+use crate::normal::{Factor, MOST, Normal, Pattern, RowSlopes};
 use crate::table::{MAX_ELECTRODES, Table};
 
 /// About so many places are looked at.
@@ -135,7 +135,7 @@ pub(crate) struct Beside<'a, 't> {
     rows: [Row; MAX_ELECTRODES],
 }
 
-/// What is left of a row.
+/// What is left of a row. Readings that say nothing are zero.
 #[derive(Clone, Copy)]
 struct Row {
     /// What is left, but for what an error of the grounded pad makes (V).
@@ -148,6 +148,13 @@ struct Row {
     less: f32,
     /// Readings that say something: a bit each.
     known: u32,
+    slopes: RowSlopes,
+    /// Of each contact the sums over readings that say something: of all alike, by their shares, and by what an error of the grounded pad makes.
+    alike: [Pattern; MAX_CONTACTS],
+    by_share: [Pattern; MAX_CONTACTS],
+    by_pad: [Pattern; MAX_CONTACTS],
+    /// The last of what is not predicted.
+    pad_of_load_v: f32,
 }
 
 impl Row {
@@ -157,16 +164,46 @@ impl Row {
         pad_v: [0.0; MAX_ELECTRODES],
         less: 0.0,
         known: 0,
+        slopes: RowSlopes::NONE,
+        alike: [Pattern::NONE; MAX_CONTACTS],
+        by_share: [Pattern::NONE; MAX_CONTACTS],
+        by_pad: [Pattern::NONE; MAX_CONTACTS],
+        pad_of_load_v: 0.0,
     };
 
-    fn is_known(&self, e: usize) -> bool {
-        self.known >> e & 1 == 1
+    /// Readings that say something, of so many electrodes, or those that do not.
+    fn electrodes(&self, n: usize, are_known: bool) -> impl Iterator<Item = usize> {
+        let bits = if are_known { self.known } else { !self.known };
+        (0..n).filter(move |e| bits >> e & 1 == 1)
     }
 
-    /// Takes what an error of the grounded pad makes off volts.
-    fn without_pad(&self, volts: &mut [f32]) {
-        let product: f32 = volts.iter().zip(&self.pad_v).map(|(volts, pad_v)| volts * pad_v).sum();
-        volts.iter_mut().zip(&self.pad_v).for_each(|(volts, pad_v)| *volts -= self.less * product * pad_v);
+    /// Takes what is left of a row by predicted readings (V).
+    fn take(&mut self, table: &Table<'_>, (frame, errors): (&Frame<'_>, &Errors), g: usize, volts: &PerElectrode) {
+        let (head, n) = (table.head(), table.electrodes());
+        let (mut pad, mut left_by_pad) = (0.0, 0.0);
+        for e in 0..n {
+            let Some(left_v) = left_v(frame, g * n + e, head.full_v, volts[e]) else { continue };
+            let pad_v = errors.pad_v(table, frame, g, e);
+            (self.left_v[e], self.pad_v[e], self.shares[e]) = (left_v, pad_v, volts[e] / head.drive_v);
+            self.known |= 1 << e;
+            pad += pad_v * pad_v;
+            left_by_pad += left_v * pad_v;
+            self.pad_of_load_v += pad_v * (1.0 - self.shares[e]);
+        }
+        self.less = 1.0 / (errors.variance_v2 + pad);
+        let share = self.less * left_by_pad;
+        (0..n).for_each(|e| self.left_v[e] -= share * self.pad_v[e]);
+    }
+
+    /// Sums up the patterns of contacts.
+    fn sum_up(&mut self, circuit: &Circuit, n: usize, unit_m: f32) {
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            let sum = |weights: &PerElectrode| {
+                Pattern::of(one, unit_m, |values| (0..n).map(|e| weights[e] * values[e]).sum())
+            };
+            (self.by_share[k], self.by_pad[k]) = (sum(&self.shares), sum(&self.pad_v));
+            self.alike[k] = Pattern::of(one, unit_m, |values| self.electrodes(n, true).map(|e| values[e]).sum());
+        }
     }
 }
 
@@ -183,22 +220,12 @@ impl<'a, 't> Beside<'a, 't> {
         let factor = Factor::of(normal, DAMPING)?;
         let mut all =
             Self { table, circuit, factor, weight: 1.0 / errors.variance_v2, rows: [Row::NONE; MAX_ELECTRODES] };
+        let mut volts = [0.0; MAX_ELECTRODES];
         for (g, row) in all.rows.iter_mut().enumerate().take(n) {
-            circuit.row_v(table, g, &mut row.shares);
-            let mut pad = 0.0;
-            for e in 0..n {
-                if let Some(left_v) = left_v(frame, g * n + e, head.full_v, row.shares[e]) {
-                    row.left_v[e] = left_v;
-                    row.known |= 1 << e;
-                    row.pad_v[e] = errors.pad_v(table, frame, g, e);
-                    pad += row.pad_v[e] * row.pad_v[e];
-                }
-                row.shares[e] /= head.drive_v;
-            }
-            row.less = 1.0 / (errors.variance_v2 + pad);
-            let mut left_v = row.left_v;
-            row.without_pad(&mut left_v[..n]);
-            row.left_v = left_v;
+            circuit.row_v(table, g, &mut volts);
+            row.take(table, (frame, errors), g, &volts);
+            row.slopes = RowSlopes::new(circuit, g, head.drive_v, head.radius_m);
+            row.sum_up(circuit, n, head.radius_m);
         }
         Some(all)
     }
@@ -233,23 +260,43 @@ impl<'a, 't> Beside<'a, 't> {
 
     /// Scalar product of what is left with what a siemens at a place would change, and the square of that but for what the contacts that there are could do as
     /// well: with potentials `p` there, a siemens changes `Vcc p_g / D_g (p_e - Z[e][g] p_g / D_g)`.
+    ///
+    /// What the contacts could do is summed up of patterns that are the same in all rows, but for readings that say nothing.
     fn look(&self, potentials_ohm: &PerElectrode) -> (f32, f32) {
-        let (head, n) = (self.table.head(), self.table.electrodes());
+        let (circuit, head, n) = (self.circuit, self.table.head(), self.table.electrodes());
+        // As differences, of which the large constant of a light contact takes no digits.
+        let mean_ohm = potentials_ohm.iter().take(n).sum::<f32>() / n as f32;
+        let apart = |e: usize| potentials_ohm[e] - mean_ohm;
+        let mut whole = [Pattern::NONE; MAX_CONTACTS];
+        for (whole, one) in whole.iter_mut().zip(&circuit.loaded).take(circuit.count) {
+            *whole = Pattern::of(one, head.radius_m, |values| (0..n).map(|e| apart(e) * values[e]).sum());
+        }
         let (mut along, mut square, mut shared) = (0.0, 0.0, [0.0; MOST]);
         for (g, row) in self.rows.iter().enumerate().take(n) {
-            let own = potentials_ohm[g];
-            let per_ohm = head.drive_v * own / self.circuit.loads_ohm[g];
-            let mut all = [0.0; MAX_ELECTRODES];
-            for e in (0..n).filter(|e| row.is_known(*e)) {
-                // As differences, of which the large constant of a light contact takes no digits.
-                all[e] = per_ohm * (potentials_ohm[e] - own + row.shares[e] * own);
-                along += all[e] * row.left_v[e];
+            let (own, own_apart) = (potentials_ohm[g], apart(g));
+            let per_ohm = head.drive_v * own / circuit.loads_ohm[g];
+            let (mut by_pad, mut of_load) = (0.0, 0.0);
+            for e in row.electrodes(n, true) {
+                let change = per_ohm * (apart(e) - own_apart + row.shares[e] * own);
+                along += change * row.left_v[e];
+                square += change * change;
+                by_pad += change * row.pad_v[e];
+                of_load += change * (1.0 - row.shares[e]);
             }
-            let mut new = all;
-            row.without_pad(&mut new[..n]);
-            square += (0..n).map(|e| all[e] * new[e]).sum::<f32>();
-            let slopes = RowSlopes::new(self.circuit, g, head.drive_v, head.radius_m);
-            slopes.add_products(self.circuit, &new[..n], &row.shares, &mut shared);
+            let of_pad = row.less * by_pad;
+            square -= of_pad * by_pad;
+            of_load -= of_pad * row.pad_of_load_v;
+            for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+                let mut pattern = Pattern::NONE;
+                pattern.add(per_ohm, &whole[k]);
+                for e in row.electrodes(n, false) {
+                    pattern.add(-per_ohm * apart(e), &Pattern::of(one, head.radius_m, |values| values[e]));
+                }
+                pattern.add(-per_ohm * own_apart, &row.alike[k]);
+                pattern.add(per_ohm * own, &row.by_share[k]);
+                pattern.add(-of_pad, &row.by_pad[k]);
+                row.slopes.add(circuit, k, &pattern, of_load, &mut shared);
+            }
         }
         let shared = shared.map(|product| self.weight * product);
         let new = square - self.factor.square(shared) / self.weight;
