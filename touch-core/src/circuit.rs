@@ -18,9 +18,10 @@
 //!
 //! A current that crowds at the rim has the fields of an even one on a wider disc. What is fitted is the radius of that disc, the spread.
 
+use crate::fields::Sample;
 use crate::head::Head;
 use crate::normal::PARAMETERS;
-use crate::table::{LEAST_SHARE, MAX_ELECTRODES, Sample, Table};
+use crate::table::{LEAST_SHARE, MAX_ELECTRODES, Table};
 
 /// Most contacts.
 pub const MAX_CONTACTS: usize = 3;

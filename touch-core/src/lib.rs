@@ -24,6 +24,7 @@ mod answer;
 mod circuit;
 mod contents;
 mod crc;
+mod fields;
 mod fit;
 mod frame;
 mod head;
@@ -31,6 +32,7 @@ mod normal;
 #[cfg(test)]
 mod samples;
 mod scan;
+mod search;
 mod solver;
 pub mod spline;
 pub mod table;

@@ -1,46 +1,37 @@
 //! Contacts from frame to frame.
 //!
-//! What was found last is fitted again. Where that no longer explains a frame, more contacts are looked for beside it, and without it. One more
-//! is believed if it lowers the sum of squares by more than its parameters' price.
+//! What was found last is fitted again. Where that explains neither a frame nor the one before, more contacts are looked for beside it, and without it. One
+//! more is believed if it lowers the sum of squares by more than its parameters' price. What leaves too much is mended: one more where that would explain much,
+//! each in turn looked for anew beside the others, and one fewer where those that stay do as well.
 
 use crate::answer::{Answer, Contact, Flags};
 use crate::circuit::{Circuit, MAX_CONTACTS};
 use crate::fit::{Fit, Fitter, Scene, Work, Working};
 use crate::frame::{Errors, Frame, FrameError, Says};
-use crate::normal::{ANY_RADIUS, MOST, PARAMETERS, USUAL_RADIUS, Vector};
-use crate::scan::{Beside, CANDIDATES, Candidates, first};
+use crate::normal::{ANY_RADIUS, MOST, PARAMETERS, Vector};
+use crate::scan::{Candidates, first};
+use crate::search::{FIRST_GAIN, freedom, is_misfit, limit};
 use crate::table::Table;
 
-/// Price of a parameter (squared deviations): that of the host's search.
-const PARAMETER_PRICE: f32 = 7.0;
-/// Parameters of a contact that have to be paid: a radius that the readings do not tell says nothing.
-const PAID: f32 = 3.0;
-/// Gain in the sum of squares, in the linear theory, for there being any contact at all, the host's; also for there being more than were found. Of 120 random
-/// scenes of three discs on `square-60` 62 are explained by three contacts: with 60 it is said of 3 that there are more, with 30 of 10. Of 201 scenes in
-/// which `auto` finds four or five it is said of 176 and of 188.
-const FIRST_GAIN: f32 = 60.0;
-/// Standard deviations of the sum of squares beyond which readings do not fit: the host's.
-const MISFIT_DEVIATIONS: f32 = 5.0;
 /// What is followed explains a frame as long as its sum of squares is below this times what the search left: the host's.
 const WORSE: f32 = 1.3;
-/// Steps at most where a contact is followed, and where it is searched.
+/// Steps at most where contacts are followed.
 const FOLLOWING: usize = 4;
-const SEARCHING: usize = 20;
 /// Conductance (sheet conductances) above which more would change nothing.
 const SATURATED_SHEETS: f32 = 100.0;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
-const PATIENCE: [u32; 2] = [1, 64];
+pub(crate) const PATIENCE: [u32; 2] = [1, 64];
 
 /// A frame to be explained.
 #[derive(Clone, Copy)]
-struct Task<'a> {
-    table: &'a Table<'a>,
-    frame: &'a Frame<'a>,
-    errors: &'a Errors,
+pub(crate) struct Task<'a> {
+    pub table: &'a Table<'a>,
+    pub frame: &'a Frame<'a>,
+    pub errors: &'a Errors,
 }
 
 impl Task<'_> {
-    fn readings(&self) -> f32 {
+    pub fn readings(&self) -> f32 {
         self.errors.count as f32
     }
 }
@@ -48,17 +39,19 @@ impl Task<'_> {
 /// Finds contacts in frames, one after the other: those of one table.
 #[derive(Clone, Debug)]
 pub struct Solver {
-    circuit: Circuit,
+    pub(crate) circuit: Circuit,
     scene: Scene,
     ids: [u32; MAX_CONTACTS],
     /// Numbers begin at 1.
     next_id: u32,
     /// What the last search left of a reading, and the frames that one that did not end well is not repeated for.
-    searched: f32,
+    pub(crate) searched: f32,
     /// Whether it left enough for another contact.
-    more: bool,
-    patience: u32,
-    wait: u32,
+    pub(crate) more: bool,
+    pub(crate) patience: u32,
+    pub(crate) wait: u32,
+    /// Whether the last frame was not explained by what was followed, or there was none.
+    was_lost: bool,
 }
 
 impl Default for Solver {
@@ -79,6 +72,7 @@ impl Solver {
             more: false,
             patience: PATIENCE[0],
             wait: 0,
+            was_lost: true,
         }
     }
 
@@ -120,24 +114,24 @@ impl Solver {
             self.wait = 0;
         }
         let most = |fit: &Fit| (WORSE * self.searched).max(limit(readings - freedom(fit)));
-        let is_lost = has_changed || found.is_some_and(|fit| fit.normal.cost > most(&fit));
-        if is_lost && self.may_search() {
-            found = self.search(found, task, &mut work);
-            found = found.and_then(|fit| self.pruned(fit, task, &mut work));
-            found = found.map(|fit| self.completed(fit, task, &mut work));
-            found = found.map(|fit| self.exchanged(fit, task, &mut work));
-            found = found.map(|fit| self.reduced(fit, task, &mut work));
-            self.more &= found.is_some();
-            self.searched = found.map_or(0.0, |fit| fit.normal.cost);
-            let fits = found.is_none_or(|fit| !is_misfit(&fit, readings));
-            self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
-            self.wait = if fits { 0 } else { self.patience };
+        let alone = if found.is_none() { first(table, frame, task.errors, &mut work) } else { Candidates::default() };
+        let is_lost = match &found {
+            None => alone[0].gain >= FIRST_GAIN,
+            Some(fit) => has_changed || fit.normal.cost > most(fit),
+        };
+        self.more &= found.is_some();
+        // While something lands or lifts, its rows are not those of one scene: the next frame tells.
+        let is_searched = is_lost && self.was_lost && self.may_search();
+        if is_searched {
+            found = self.search(found, alone, task, &mut work);
         }
+        self.was_lost = is_lost;
         self.scene = found.map_or_else(Scene::default, |fit| fit.scene);
         self.number(&before);
         let mut answer = self.answer(found, task, work.done);
         answer.left_out = left_out;
         answer.flags.raise(Flags::FAULT, left_out != 0);
+        answer.flags.raise(Flags::MISFIT, is_lost && !is_searched);
         Ok(answer)
     }
 
@@ -153,15 +147,7 @@ impl Solver {
         self.pruned(fit, task, work)
     }
 
-    /// A fit without the contacts that the readings do not speak for; `None` if none is left.
-    fn pruned(&mut self, mut fit: Fit, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
-        while let Some(gone) = weakest(&fit) {
-            fit = self.fit(fit.scene.without(gone), ANY_RADIUS, SEARCHING, task, work)?;
-        }
-        Some(fit)
-    }
-
-    fn fit(
+    pub(crate) fn fit(
         &mut self,
         scene: Scene,
         radius_deviation: f32,
@@ -171,112 +157,6 @@ impl Solver {
     ) -> Option<Fit> {
         let Task { table, frame, errors } = task;
         Fitter { table, frame, errors, circuit: &mut self.circuit, work, radius_deviation }.fit(scene, steps)
-    }
-
-    /// The best explanation that is found, from what was followed or from nothing.
-    fn search(&mut self, from: Option<Fit>, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
-        let best = from.and_then(|from| self.grown(from, task, work));
-        // What there was more than is no place to go on from.
-        if !self.more && best.is_some_and(|best| !is_misfit(&best, task.readings())) {
-            return best;
-        }
-        let candidates = first(task.table, task.frame, task.errors, work);
-        if candidates[0].gain < FIRST_GAIN {
-            return best;
-        }
-        let starts = candidates.map(|candidate| (candidate.gain > 0.0).then(|| Scene::default().with(candidate.spot)));
-        let one = self.best_of(&starts, USUAL_RADIUS, task, work);
-        better(best, one.and_then(|one| self.grown(one, task, work)))
-    }
-
-    /// The best fit from some starts.
-    fn best_of(
-        &mut self,
-        starts: &[Option<Scene>; CANDIDATES],
-        radius_deviation: f32,
-        task: Task<'_>,
-        work: &mut Working<'_>,
-    ) -> Option<Fit> {
-        let mut best = None;
-        for start in starts.iter().flatten() {
-            best = better(best, self.fit(*start, radius_deviation, SEARCHING, task, work));
-            if best.is_some_and(|best: Fit| !is_misfit(&best, task.readings())) {
-                break;
-            }
-        }
-        best
-    }
-
-    /// The likeliest number of contacts from some that are found on, one more at a time.
-    fn grown(&mut self, from: Fit, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
-        let (mut at, mut best) = (from, None);
-        loop {
-            best = better(best, self.fit(at.scene, ANY_RADIUS, SEARCHING, task, work));
-            if at.scene.count == MAX_CONTACTS {
-                return best;
-            }
-            let candidates = self.beside(&at, task, work);
-            let starts = candidates.map(|one| (one.gain > PAID * PARAMETER_PRICE).then(|| at.scene.with(one.spot)));
-            let Some(more) = self.best_of(&starts, USUAL_RADIUS, task, work) else { return best };
-            at = more;
-        }
-    }
-
-    /// Contacts with those that are looked for beside them as long as one would explain much of what they leave; notes whether another one would.
-    fn completed(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
-        loop {
-            let candidates = self.beside(&best, task, work);
-            self.more = candidates[0].gain > FIRST_GAIN;
-            if !self.more || best.scene.count == MAX_CONTACTS {
-                return best;
-            }
-            let starts = candidates.map(|one| (one.gain > FIRST_GAIN).then(|| best.scene.with(one.spot)));
-            let new = self.best_of(&starts, ANY_RADIUS, task, work);
-            match new.filter(|new| score(new) < score(&best)) {
-                Some(new) => best = new,
-                None => return best,
-            }
-        }
-    }
-
-    /// Contacts that leave too much, with each in turn looked for anew beside the others: one that went astray early is held there by those that came after it.
-    fn exchanged(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
-        let (mut k, mut kept) = (0, 0);
-        while kept < best.scene.count && (self.more || is_misfit(&best, task.readings())) {
-            k %= best.scene.count;
-            let rest = self.fit(best.scene.without(k), USUAL_RADIUS, SEARCHING, task, work);
-            let new = rest.and_then(|rest| self.grown(rest, task, work)).and_then(|new| self.pruned(new, task, work));
-            let before = self.more;
-            let new = new.map(|new| self.completed(new, task, work));
-            match new.filter(|new| score(new) < score(&best) - PARAMETER_PRICE) {
-                Some(new) => (best, kept) = (new, 0),
-                None => (k, kept, self.more) = (k + 1, kept + 1, before),
-            }
-        }
-        best
-    }
-
-    /// Contacts without those that the others do as well without, once they are fitted anew: a second one that was found while the first was too small.
-    fn reduced(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
-        while best.scene.count > 1 {
-            let mut fewer = None;
-            for k in 0..best.scene.count {
-                fewer = better(fewer, self.fit(best.scene.without(k), ANY_RADIUS, SEARCHING, task, work));
-            }
-            match fewer.filter(|fewer| score(fewer) < score(&best)) {
-                Some(fewer) => best = fewer,
-                None => return best,
-            }
-        }
-        best
-    }
-
-    /// Where one more contact would explain most of what others leave.
-    fn beside(&mut self, fit: &Fit, task: Task<'_>, work: &mut Working<'_>) -> Candidates {
-        let Task { table, frame, errors } = task;
-        let is_solved = self.circuit.solve(table, fit.scene.spots());
-        let beside = is_solved.then(|| Beside::new(table, &self.circuit, frame, errors, &fit.normal)).flatten();
-        beside.map_or_else(Candidates::default, |beside| beside.candidates(errors, work))
     }
 
     /// Gives contacts the numbers of the nearest ones before.
@@ -350,43 +230,4 @@ impl Solver {
             correlation: if x * y > 0.0 { of(0, 1) / (x * y) } else { 0.0 },
         }
     }
-}
-
-fn freedom(fit: &Fit) -> f32 {
-    PAID * fit.scene.count as f32
-}
-
-/// Sum of squares of so many normal numbers beyond which they are not those of noise.
-fn limit(freedom: f32) -> f32 {
-    let freedom = freedom.max(1.0);
-    freedom + MISFIT_DEVIATIONS * libm::sqrtf(2.0 * freedom)
-}
-
-fn is_misfit(fit: &Fit, readings: f32) -> bool {
-    fit.normal.cost > limit(readings - freedom(fit))
-}
-
-/// The sum of squares with the price of contacts: of two explanations the lower one is believed.
-fn score(fit: &Fit) -> f32 {
-    fit.normal.objective() + PARAMETER_PRICE * PAID * fit.scene.count as f32
-}
-
-fn better(a: Option<Fit>, b: Option<Fit>) -> Option<Fit> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(if score(&b) < score(&a) { b } else { a }),
-        (a, b) => a.or(b),
-    }
-}
-
-/// The contact that the readings speak least for, if that is less than its price: of a light one, whose readings are in proportion to its conductance, the
-/// square of them is that of the derivative by its logarithm, or what others leave of that.
-fn weakest(fit: &Fit) -> Option<usize> {
-    let covariance = fit.normal.covariance();
-    let information = |k: usize| {
-        let strength = PARAMETERS * k + 2;
-        let left = covariance.as_ref().map_or(f32::INFINITY, |all| 1.0 / all[strength][strength]);
-        fit.normal.matrix[strength][strength].min(left)
-    };
-    let least = (0..fit.scene.count).min_by(|a, b| information(*a).total_cmp(&information(*b)))?;
-    (information(least) < PAID * PARAMETER_PRICE).then_some(least)
 }
