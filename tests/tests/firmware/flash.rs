@@ -60,7 +60,8 @@ impl<'f, const WORD: usize, const SECTOR: usize> View<&'f mut Chip<WORD, SECTOR>
     }
 }
 
-type Finder<'a, const WORD: usize, const SECTOR: usize> = ContactFinder<FlashStore<&'a mut Chip<WORD, SECTOR>, Seen>, 256>;
+type Finder<'a, const WORD: usize, const SECTOR: usize> =
+    ContactFinder<FlashStore<&'a mut Chip<WORD, SECTOR>, Seen>, 256>;
 
 fn store<const WORD: usize, const SECTOR: usize>(
     chip: &mut Chip<WORD, SECTOR>,
