@@ -87,9 +87,9 @@ impl NorFlash for Flash {
 
 /// Sets the watchdog's time anew and begins it.
 fn set_watchdog(timeout_ms: u32) {
-    // SAFETY: the board's own is not used meanwhile, and keeps nothing but this handle.
-    let registers = unsafe { IWDG::steal() };
-    let mut watchdog = IndependentWatchdog::new(unsafe { IWDG::steal() });
+    // SAFETY: the board's own is not used meanwhile, and keeps nothing but such a handle.
+    let [registers, handle] = [(), ()].map(|()| unsafe { IWDG::steal() });
+    let mut watchdog = IndependentWatchdog::new(handle);
     watchdog.start(timeout_ms.millis());
     // The time that it begins with is the old one until the new one has come over into its clock.
     let _ = within(MAX_LOOKS, || {
