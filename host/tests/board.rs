@@ -96,7 +96,11 @@ fn an_image_for_another_board_or_none_is_told_before_a_tool_is_called() {
         (&image_of("stm32f405"), "esp32c3", "for the processor ARM"),
         (&of_c3, "esp32c6", "0x3fc80000, where the esp32c6 has no memory"),
         (&image_of("esp32c6"), "esp32c3", "built for another chip"),
-        (&elf(40, 0x0800_0000, (0x080d_ffff, 8), 0x0800_0000), "stm32f405", "0x080dffff, where the stm32f405 has no memory"),
+        (
+            &elf(40, 0x0800_0000, (0x080d_ffff, 8), 0x0800_0000),
+            "stm32f405",
+            "0x080dffff, where the stm32f405 has no memory",
+        ),
         (&elf(243, 0x4200_0020, (0x3fc8_0000, 8), 0), "esp32c3", "it begins at 0x00000000"),
         (&elf(243, 0x4200_0020, (0x3fc8_0000, 8), 0x3fc8_0000), "esp32c3", "where it has no code"),
         (&part, "esp32c3", "not linked yet"),

@@ -17,8 +17,8 @@ pub enum Trouble {
 pub struct Chip<const WORD: usize, const SECTOR: usize> {
     /// What it holds.
     pub bytes: Vec<u8>,
-    /// Operations that wrote.
-    pub writes: usize,
+    /// Operations that wrote or erased.
+    pub operations: usize,
     /// Whether each word may be written.
     blank: Vec<bool>,
     erased: Vec<u32>,
@@ -35,7 +35,7 @@ impl<const WORD: usize, const SECTOR: usize> Chip<WORD, SECTOR> {
         let mut random = fastrand::Rng::with_seed(seed);
         Self {
             bytes: (0..length).map(|_| random.u8(..)).collect(),
-            writes: 0,
+            operations: 0,
             blank: vec![false; length / WORD],
             erased: vec![0; length / SECTOR],
             plan: None,
@@ -63,6 +63,7 @@ impl<const WORD: usize, const SECTOR: usize> Chip<WORD, SECTOR> {
 
     /// What goes wrong in this operation; `can_be_weak` where one bit less can be told.
     fn trouble(&mut self, can_be_weak: bool) -> Option<Trouble> {
+        self.operations += 1;
         if self.is_off {
             return Some(Trouble::PowerLoss);
         }
@@ -139,7 +140,6 @@ impl<const WORD: usize, const SECTOR: usize> NorFlash for Chip<WORD, SECTOR> {
                 Some(_) => {}
             }
         }
-        self.writes += 1;
         match trouble {
             None | Some(Trouble::Weak) => Ok(()),
             Some(_) => Err(NorFlashErrorKind::Other),
