@@ -45,4 +45,4 @@ pub use parts::{Chip, Parts, Sampler, Serial, TimedOut};
 pub use row::Row;
 pub use scan::Scanned;
 pub use side_by_side::{ConverterPair, SideBySide};
-pub use touch::{ContactFinder, NoTouch, RamStore, TableStore, Touch};
+pub use touch::{ContactFinder, FlashStore, NoTouch, RamCopy, RamStore, TableStore, Touch, View};

@@ -2,6 +2,7 @@
 
 mod cells;
 mod finder;
+mod flash;
 mod input;
 mod rest;
 mod store;
@@ -9,6 +10,7 @@ mod store;
 use tactomo_protocol::{Contacts, Hello, Output, Scope, TablePiece, TableState};
 
 pub use self::finder::ContactFinder;
+pub use self::flash::{FlashStore, RamCopy, View};
 pub use self::store::{RamStore, TableStore};
 use crate::scan::Scanned;
 

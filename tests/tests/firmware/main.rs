@@ -5,6 +5,8 @@ mod closed_loop;
 mod commands;
 mod contacts;
 mod failures;
+mod flash;
+mod nor_flash;
 mod parts;
 mod plans;
 mod rate;

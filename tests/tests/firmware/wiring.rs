@@ -15,6 +15,11 @@ const STM32_MAIN: &str = include_str!("../../../firmware/boards/stm32f405/src/ma
 const ONE_INPUT: &str = include_str!("../../../firmware/boards/espressif/src/one_input.rs");
 const ESPRESSIF_CHIP: &str = include_str!("../../../firmware/boards/espressif/src/chip.rs");
 const COMMON: &str = include_str!("../../../firmware/boards/common/src/lib.rs");
+const ESPRESSIF_TABLE: &str = include_str!("../../../firmware/boards/espressif/src/table.rs");
+const STM32_FLASH: &str = include_str!("../../../firmware/boards/stm32f405/src/flash.rs");
+const STM32_MEMORY: &str = include_str!("../../../firmware/boards/stm32f405/memory.x");
+const IMAGES: &str = include_str!("../../../host/src/commands/board/elf.rs");
+const FIRMWARE_PAGE: &str = include_str!("../../../docs/firmware.md");
 
 /// Cells of the page's table rows, without ends and quotes.
 fn rows() -> Vec<Vec<String>> {
@@ -110,4 +115,21 @@ fn the_watchdog_and_the_oldest_silicon_are_those_of_the_page() {
     assert!([ESPRESSIF_CHIP, STM32_MAIN].iter().all(|user| user.contains("(WATCHDOG_TIMEOUT_MS.")), "both take it");
     assert!(row("Fault: Reset(watchdog)")[1].contains("for a second"));
     assert!(ESP32_CONFIG.contains("\nESP_HAL_CONFIG_MIN_CHIP_REVISION = \"0\"\n"), "as a line of its own");
+}
+
+/// The number behind this in a source, in hexadecimal digits.
+fn address(text: &str, before: &str) -> u32 {
+    let digits = between(text, before, ";").replace('_', "");
+    u32::from_str_radix(digits.trim_start_matches("0x"), 16).unwrap()
+}
+
+#[test]
+fn tables_lie_where_no_image_reaches() {
+    let espressif = address(ESPRESSIF_TABLE, "const TABLE_AT: u32 = ");
+    assert_eq!(espressif, 0x1_0000 + address(IMAGES, "const ESP_FLASH: u64 = "), "behind the longest image");
+    assert!(FIRMWARE_PAGE.contains(&format!("| {espressif:#08X} of the module's flash")));
+    let stm32 = address(STM32_FLASH, "const SECTOR_AT: u32 = ");
+    assert!(IMAGES.contains("0x0800_0000..0x080e_0000") && stm32 == 0xE_0000);
+    assert!(STM32_MEMORY.contains("LENGTH = 1024K - 128K") && stm32 == (1024 - 128) * 1024);
+    assert!(FIRMWARE_PAGE.contains(&format!("| 0x080{:X}, sector 11 |", stm32)));
 }

@@ -5,6 +5,7 @@
 #![no_main]
 
 mod chip;
+mod flash;
 mod inputs;
 mod line;
 
@@ -15,7 +16,7 @@ use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use tactomo_board_common::WATCHDOG_TIMEOUT_MS;
 use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Board16, Identity, NoTouch, Parts};
+use tactomo_firmware::{Board16, Identity, Parts};
 
 use crate::chip::{StmChip, boot_fault};
 use crate::inputs::{ELECTRODES, Inputs};
@@ -66,7 +67,7 @@ fn main() -> ! {
         sampler: inputs,
         serial,
         chip: StmChip::new(delay, counter, watchdog),
-        touch: NoTouch,
+        touch: flash::finder(device.FLASH),
     };
     let identity = Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),
