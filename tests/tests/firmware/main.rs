@@ -1,10 +1,12 @@
 //! The firmware library: on mocked parts, and as the simulated board.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod bench;
 mod closed_loop;
 mod commands;
 mod contacts;
 mod failures;
+mod hid;
 mod parts;
 mod plans;
 mod rate;

@@ -7,6 +7,8 @@
 mod chip;
 mod inputs;
 mod line;
+#[cfg(feature = "hid")]
+mod touch_screen;
 
 use stm32f4xx_hal::otg_fs::USB;
 use stm32f4xx_hal::pac::{CorePeripherals, Peripherals};
@@ -14,8 +16,10 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use tactomo_board_common::WATCHDOG_TIMEOUT_MS;
+#[cfg(not(feature = "hid"))]
+use tactomo_firmware::NoTouch;
 use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Board16, Identity, NoTouch, Parts};
+use tactomo_firmware::{Board16, Identity, Parts};
 
 use crate::chip::{StmChip, boot_fault};
 use crate::inputs::{ELECTRODES, Inputs};
@@ -54,6 +58,14 @@ fn main() -> ! {
     let usb =
         USB::new((device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK), (a.pa11, a.pa12), &rcc.clocks);
     let Some(serial) = UsbLine::new(usb) else { panic!("the USB port has no room for its names") };
+    #[cfg(not(feature = "hid"))]
+    let touch = NoTouch;
+    // A store without room: contacts are not found yet.
+    #[cfg(feature = "hid")]
+    let touch = {
+        let finder = tactomo_firmware::ContactFinder::new(tactomo_firmware::RamStore::new([]));
+        tactomo_firmware::Digitizer::<_, _, { ELECTRODES as usize * ELECTRODES as usize }>::new(finder, serial.screen)
+    };
     let mut counter = device.TIM2.counter_us(&mut rcc);
     if counter.start(u32::MAX.micros()).is_err() {
         panic!("the clock does not start");
@@ -66,7 +78,7 @@ fn main() -> ! {
         sampler: inputs,
         serial,
         chip: StmChip::new(delay, counter, watchdog),
-        touch: NoTouch,
+        touch,
     };
     let identity = Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),
