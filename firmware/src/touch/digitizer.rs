@@ -8,7 +8,8 @@ use crate::scan::Scanned;
 
 /// A [`ContactFinder`] whose contacts go to `H` as [reports](crate::hid), as soon as it has a table and for as long.
 ///
-/// Until readings at rest are known none are sent: what they are off by might look like a touch. While nothing touches no report is sent. The host of the line can
+/// Until readings at rest are known none are sent: what they are off by might look like a touch. A contact is told from its second frame on,
+/// and when the readings are explained. While nothing touches no report is sent. The host of the line can
 /// ask for contacts, frames or both meanwhile, but for whole frames only.
 #[derive(Debug)]
 pub struct Digitizer<S, H, const READINGS: usize> {
@@ -39,12 +40,16 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Digitizer<S, H, READIN
         }
     }
 
-    /// Tells what touches in the scan at this time (us), if anything does or did.
-    fn report(&mut self, touching: &[ContactCode], time_us: u64) {
+    /// Tells what touches in the scan at this time (us), if anything does or did, and if that is known.
+    fn report(&mut self, found: Option<&Contacts>, time_us: u64) {
+        let known = found.filter(|contacts| !contacts.flags.has(ContactFlags::RESTING));
+        let touching: &[ContactCode] = known.map_or(&[], |contacts| &contacts.found);
+        let is_explained = known.is_some_and(|contacts| !contacts.flags.has(ContactFlags::MISFIT));
         let bounds_m = self.bounds_m.unwrap_or_default();
-        self.fingers.follow(touching.iter().map(|contact| (contact.id, place(contact.at_m(), bounds_m))));
+        let places = touching.iter().map(|contact| (contact.id, place(contact.at_m(), bounds_m)));
+        self.fingers.follow(places, is_explained);
         if self.fingers.are_any() && self.sink.send(&self.fingers.report(time_us)) {
-            self.fingers.told();
+            self.fingers.forget_gone();
         }
     }
 }
@@ -101,8 +106,7 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Touch for Digitizer<S,
         attend: &mut dyn FnMut(),
     ) -> Option<Contacts> {
         let found = self.finder.contacts(scanned, scope, readings, attend);
-        let known = found.as_ref().filter(|contacts| !contacts.flags.has(ContactFlags::RESTING));
-        self.report(known.map_or(&[], |contacts| &contacts.found), scanned.time_us);
+        self.report(found.as_ref(), scanned.time_us);
         found.filter(|_| self.output.has_contacts())
     }
 }

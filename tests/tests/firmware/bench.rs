@@ -1,6 +1,7 @@
 //! A board that finds contacts, on a simulated detector.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
+use std::convert::Infallible;
 use std::rc::Rc;
 use std::sync::{Arc, LazyLock};
 
@@ -9,10 +10,10 @@ use tactomo::detector::Detector;
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
 use tactomo::simulate::{Physics, Simulation};
 use tactomo::solve::{Problem, compile};
-use tactomo_firmware::{ContactFinder, RamStore, TimedOut, Touch};
+use tactomo_firmware::{ContactFinder, Mux, RamStore, TimedOut, Touch};
 use tactomo_protocol::{BoardMessage, Command, Contacts, Fault, MAX_PIECE, TablePiece, TableState};
 
-use crate::parts::{NoMux, Outside, TestBoard, board_with, step};
+use crate::parts::{Outside, TestBoard, board_with, step};
 
 /// Room for a table (bytes).
 pub const ROOM: usize = 128 * 1024;
@@ -36,7 +37,25 @@ pub fn table_memory() -> Vec<u8> {
 }
 
 type Sample = Box<dyn FnMut(u64, u8) -> Result<u16, TimedOut>>;
-type FindingBoard<T> = TestBoard<NoMux, Sample, NoopDelay, T>;
+type FindingBoard<T> = TestBoard<KnownGround, Sample, NoopDelay, T>;
+
+/// A multiplexer that tells which electrode is grounded.
+#[derive(Clone, Default)]
+pub struct KnownGround(Rc<Cell<u8>>);
+
+impl Mux for KnownGround {
+    type Error = Infallible;
+    const SELECT_US: u16 = 0;
+
+    fn ground(&mut self, electrode: u8) -> Result<(), Infallible> {
+        self.0.set(electrode);
+        Ok(())
+    }
+
+    fn select(&mut self, _electrode: u8) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
 
 /// A board with this touch part, the voltages that it reads, and its outside.
 pub struct Bench<T> {
@@ -49,14 +68,15 @@ pub struct Bench<T> {
 impl<T: Touch> Bench<T> {
     pub fn new(touch: T) -> Self {
         let (outside, volts) = (Outside::default(), Rc::new(RefCell::new(vec![0.0; 256])));
-        let read = Rc::clone(&volts);
-        let sample: Sample = Box::new(move |number, _| {
-            let volts: f64 = read.borrow()[number as usize % 256];
+        let (mux, read) = (KnownGround::default(), Rc::clone(&volts));
+        let ground = mux.clone();
+        let sample: Sample = Box::new(move |number, electrode| {
+            let volts: f64 = read.borrow()[16 * usize::from(ground.0.get()) + usize::from(electrode)];
             // Noise of half a code, as a converter of little has.
             let noise = ((number.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f64 / f64::from(1 << 24)) - 0.5;
             Ok((volts / 3.3 * 4096.0 + 0.5 + noise).max(0.0) as u16)
         });
-        let board = board_with(&outside, NoMux, sample, NoopDelay::new(), touch);
+        let board = board_with(&outside, mux, sample, NoopDelay::new(), touch);
         Self { board, volts, outside, tag: 0 }
     }
 
