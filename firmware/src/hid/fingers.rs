@@ -2,16 +2,18 @@
 
 use tactomo_protocol::contacts::MAX_CONTACTS;
 
-use super::{FINGER_BYTES, REPORT_BYTES, Report, TOUCH_ID};
+use super::{FINGER_BYTES, LAST_PLACE, REPORT_BYTES, Report, TOUCH_ID};
 
-/// Frames that a contact waits for one that is explained. More than three contacts, or a palm, never are.
+/// A contact that has moved by no more along each axis since the last frame stands still: a hundredth of the side.
+const STILL: u16 = LAST_PLACE / 100;
+/// Frames after which it need not.
 const MOST_FRAMES: u8 = 8;
 
 /// What is known of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// It has been there for so many frames, and is not told yet. While something lands a frame is partly of before and partly of after, and shows it where it is not; a
-    /// fit takes some frames from there.
+    /// It has been there for so many frames, and has not stood still. While something lands a frame is partly of before and partly of after, and shows it where it is
+    /// not; a fit takes some frames from there.
     Lands(u8),
     /// It touches.
     Touches,
@@ -30,12 +32,13 @@ struct Finger {
 }
 
 impl Finger {
-    /// What is known of it after another frame, in which it is there or not, and which contacts explain or not.
-    fn next(self, found: Option<[u16; 2]>, is_explained: bool) -> Option<Self> {
+    /// What is known of it after another frame, in which it is there or not.
+    fn next(self, found: Option<[u16; 2]>) -> Option<Self> {
+        let moved = found.map_or(0, |at| at[0].abs_diff(self.at[0]).max(at[1].abs_diff(self.at[1])));
         let state = match (found, self.state) {
             (None, State::Lands(_)) => return None,
             (None, _) => State::Gone,
-            (Some(_), State::Lands(frames)) if !is_explained && frames < MOST_FRAMES => State::Lands(frames + 1),
+            (Some(_), State::Lands(frames)) if moved > STILL && frames < MOST_FRAMES => State::Lands(frames + 1),
             (Some(_), _) => State::Touches,
         };
         Some(Self { at: found.unwrap_or(self.at), state, ..self })
@@ -53,11 +56,11 @@ pub(crate) struct Fingers([Option<Finger>; MAX_CONTACTS]);
 impl Fingers {
     pub const NONE: Self = Self([None; MAX_CONTACTS]);
 
-    /// Takes what touches now: numbers and places, and whether they explain the readings.
-    pub fn follow(&mut self, touching: impl Iterator<Item = (u8, [u16; 2])> + Clone, is_explained: bool) {
+    /// Takes what touches now: numbers and places.
+    pub fn follow(&mut self, touching: impl Iterator<Item = (u8, [u16; 2])> + Clone) {
         for place in &mut self.0 {
             let found = |finger: &Finger| touching.clone().find(|(id, _)| *id == finger.id).map(|(_, at)| at);
-            *place = place.and_then(|finger| finger.next(found(&finger), is_explained));
+            *place = place.and_then(|finger| finger.next(found(&finger)));
         }
         for (id, at) in touching {
             let is_known = self.0.iter().flatten().any(|finger| finger.id == id);
@@ -111,7 +114,7 @@ mod tests {
     }
 
     fn follow(fingers: &mut Fingers, numbers: &[u8]) {
-        fingers.follow(numbers.iter().map(|id| (*id, [7, 9])), true);
+        fingers.follow(numbers.iter().map(|id| (*id, [7, 9])));
     }
 
     #[test]
@@ -148,13 +151,15 @@ mod tests {
     }
 
     #[test]
-    fn contacts_that_do_not_explain_the_readings_are_told_late() {
-        let mut fingers = Fingers::NONE;
-        let mut frames = 0;
-        while !fingers.are_any() {
-            fingers.follow([(1, [0, 0])].into_iter(), false);
-            frames += 1;
-        }
-        assert_eq!(frames, MOST_FRAMES + 1);
+    fn contacts_that_do_not_stand_still_are_told_late() {
+        let frames = |step: u16| {
+            let (mut fingers, mut frames) = (Fingers::NONE, 0);
+            while !fingers.are_any() {
+                frames += 1;
+                fingers.follow([(1, [500, frames * step])].into_iter());
+            }
+            frames
+        };
+        assert_eq!([STILL, STILL + 1].map(frames), [2, 1 + u16::from(MOST_FRAMES)]);
     }
 }

