@@ -317,18 +317,20 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
     }
 
     fn send(&mut self, scanned: Scanned) {
-        if scanned.stuck && !self.stuck_reported && self.hello.is_streaming {
+        // What is scanned for the touch part alone goes nowhere else.
+        let is_silent = self.parts.touch.needs_frames() && !self.hello.is_streaming;
+        if scanned.stuck && !self.stuck_reported && !is_silent {
             self.fault(Fault::AdcStuck);
         }
         self.stuck_reported = scanned.stuck;
-        let Self { parts, scan, uplink, inbox, hello, .. } = self;
+        let Self { parts, scan, uplink, inbox, .. } = self;
         let Parts { serial, chip, touch, .. } = parts;
         let mut attend = || {
             chip.feed_watchdog();
             Line { uplink, serial, inbox, waits: true }.transfer(chip);
         };
         let contacts = touch.contacts(&scanned, scan.scope(), scan.readings(), &mut attend);
-        if hello.is_streaming {
+        if !is_silent {
             let readings = touch.output().has_frames().then(|| (scan.scope(), scan.readings()));
             uplink.frame(&scanned, readings, contacts);
         }
