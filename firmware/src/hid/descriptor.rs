@@ -15,20 +15,23 @@ pub const DESCRIPTOR_BYTES: usize = HEAD.len() + MAX_CONTACTS * FINGER.len() + T
 
 const LAST: [u8; 2] = LAST_PLACE.to_le_bytes();
 
-const HEAD: [u8; 8] = [
+#[rustfmt::skip]
+const HEAD: [u8; 14] = [
     0x05, 0x0D, // usage page: digitizers
     0x09, 0x04, // usage: touch screen
     0xA1, 0x01, // collection: application
     0x85, TOUCH_ID, // report number
+    0x15, 0x00, 0x35, 0x00, // all from 0
+    0x95, 0x01, // one field of each
 ];
 
 #[rustfmt::skip]
-const FINGER: [u8; 65] = [
+const FINGER: [u8; 63] = [
     0x05, 0x0D, // usage page: digitizers
     0x09, 0x22, // usage: finger
     0xA1, 0x02, // collection: logical
-    0x15, 0x00, 0x25, 0x01, // from 0 to 1
-    0x75, 0x01, 0x95, 0x01, // one field of 1 bit
+    0x25, 0x01, // to 1
+    0x75, 0x01, // 1 bit
     0x09, 0x42, 0x81, 0x02, // tip switch
     0x75, 0x07, 0x81, 0x03, // 7 bits that say nothing
     0x26, 0xFF, 0x00, // to 255
@@ -38,23 +41,23 @@ const FINGER: [u8; 65] = [
     0x26, LAST[0], LAST[1], // to the last place
     0x75, 0x10, // 16 bits
     0x55, 0x0D, 0x65, 0x11, // in units of 10^-3 cm
-    0x35, 0x00, 0x47, 0, 0, 0, 0, // from 0 to the width
+    0x47, 0, 0, 0, 0, // to the width
     0x09, 0x30, 0x81, 0x02, // x
     0x47, 0, 0, 0, 0, // to the height
     0x09, 0x31, 0x81, 0x02, // y
-    0x45, 0x00, // no size any more
+    0x45, 0x00, 0x55, 0x00, 0x65, 0x00, // no size and no unit any more
     0xC0, // end of the collection
 ];
 /// Where width and height stand in it.
-const SIZES_AT: [usize; 2] = [45, 54];
+const SIZES_AT: [usize; 2] = [39, 48];
 
 #[rustfmt::skip]
-const TAIL: [u8; 46] = [
+const TAIL: [u8; 44] = [
     0x05, 0x0D, // usage page: digitizers
     0x27, 0xFF, 0xFF, 0x00, 0x00, // to 65535
     0x47, 0xFF, 0xFF, 0x00, 0x00, // which are so many
     0x55, 0x0C, 0x66, 0x01, 0x10, // units of 10^-4 s
-    0x75, 0x10, 0x95, 0x01, // 16 bits
+    0x75, 0x10, // 16 bits
     0x09, 0x56, 0x81, 0x02, // scan time
     0x45, 0x00, 0x55, 0x00, 0x65, 0x00, // no unit any more
     0x25, MAX_CONTACTS as u8, // to as many as there can be

@@ -3,7 +3,9 @@
 //! "Device Class Definition for HID 1.11", sections 6.2.1 and 7. Not the crate `usbd-hid`: it refuses every request for a report (0.10), and Windows asks a touch
 //! screen for the one that tells how many contacts there can be.
 
-use tactomo_firmware::hid::{COUNT_ID, COUNT_REPORT, DESCRIPTOR_BYTES, REPORT_BYTES, Report, ReportSink, descriptor};
+use tactomo_firmware::hid::{
+    COUNT_ID, COUNT_REPORT, DESCRIPTOR_BYTES, REPORT_BYTES, Report, ReportSink, TOUCH_ID, descriptor,
+};
 use usb_device::Result;
 use usb_device::bus::{InterfaceNumber, UsbBus, UsbBusAllocator};
 use usb_device::class::{ControlIn, ControlOut, UsbClass};
@@ -29,6 +31,16 @@ const POLL_MS: u8 = 1;
 const HID: [u8; 7] = {
     let [low, high] = (DESCRIPTOR_BYTES as u16).to_le_bytes();
     [0x11, 0x01, 0, 1, REPORT_DESCRIPTOR, low, high]
+};
+
+// What usb-device's feature `control-buffer-256` has room for.
+const _: () = assert!(DESCRIPTOR_BYTES <= 256);
+
+/// Nothing touches.
+const NOTHING: Report = {
+    let mut report = [0; REPORT_BYTES];
+    report[0] = TOUCH_ID;
+    report
 };
 
 /// The interface.
@@ -59,13 +71,6 @@ impl<'a, B: UsbBus> UsbDigitizer<'a, B> {
         self.is_open = is_open;
     }
 }
-
-/// Nothing touches.
-const NOTHING: Report = {
-    let mut report = [0; REPORT_BYTES];
-    report[0] = tactomo_firmware::hid::TOUCH_ID;
-    report
-};
 
 impl<B: UsbBus> ReportSink for UsbDigitizer<'_, B> {
     fn set_size(&mut self, size_m: [f32; 2]) {

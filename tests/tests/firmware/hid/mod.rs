@@ -127,7 +127,9 @@ fn the_descriptor_is_of_a_touch_screen_and_reports_are_as_long_as_it_says() {
     assert_eq!((time.unit, time.exponent, time.logical, time.physical), (0x1001, -4, [0, 65535], [0, 65535]));
     let most = descriptor.of(MOST)[0];
     assert_eq!((most.kind, most.value(&COUNT_REPORT)), (Kind::Feature, 3));
-    assert!([TIP, ID].map(|usage| descriptor.of(usage)[0].unit) == [0, 0] && most.unit == 0);
+    for field in [TIP, ID, COUNT, MOST].into_iter().flat_map(|usage| descriptor.of(usage)) {
+        assert_eq!((field.unit, field.exponent, field.physical), (0, 0, field.logical), "{field:?}");
+    }
     let widest = Descriptor::read(&hid::descriptor([0.655, 0.4]));
     assert_eq!(widest.of(X)[2].physical, [0, 65500]);
 }
