@@ -14,11 +14,11 @@ use tactomo::board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo::detector::Detector;
 use tactomo::forward::{ForwardModel, touched_impedance_ohm};
 use tactomo::readings::Readings;
-use tactomo::scene::{Hand, Scene, SceneName};
+use tactomo::scene::{Contact, Hand, Scene, SceneName};
 use tactomo::simulate::{Fault, Measurement, Physics, finer_model};
 use tactomo::solve::{
     ElectrodeFault, ElectrodeWatch, FaultTolerant, FaultyElectrodes, FoundContact, FoundShape, Look, Method, Problem,
-    Solver, without,
+    Solver, faulty_electrodes, without,
 };
 use tactomo_physics::threads;
 use tactomo_protocol::{BoardMessage, BoardReceiver};
@@ -67,12 +67,13 @@ struct Bench {
 }
 
 /// The default detector, for all tests.
-static BENCH: LazyLock<Bench> = LazyLock::new(|| {
-    let detector = Detector::default();
-    Bench { fine: finer_model(&detector, &[], 1).unwrap(), problem: Problem::of(&detector).unwrap() }
-});
+static BENCH: LazyLock<Bench> = LazyLock::new(|| Bench::of(&Detector::default()));
 
 impl Bench {
+    fn of(detector: &Detector) -> Self {
+        Self { fine: finer_model(detector, &[], 1).unwrap(), problem: Problem::of(detector).unwrap() }
+    }
+
     /// Impedances under what touches at the start of a scene.
     fn touched_ohm(&self, scene: SceneName, seed: u64) -> DMatrix<f64> {
         let detector = self.fine.detector();
@@ -141,8 +142,11 @@ impl Bench {
 /// The contacts of the last frames of some, without the electrodes that the first ones show to be faulty, and what is wrong with these.
 fn answered(problem: &Problem, frames: &[Readings]) -> (Vec<FoundContact>, Vec<(usize, ElectrodeFault)>) {
     let mut watch = ElectrodeWatch::new(problem.detector());
+    // The press is steady, and so is what a solver that takes all wires to be sound makes of it.
+    let taken_as_sound = without(Method::Auto, problem, watch.faulty()).unwrap().solve(&frames[0]).unwrap();
     for frame in frames {
         watch.note(frame);
+        watch.answered(&taken_as_sound);
     }
     let mut solver = without(Method::Auto, problem, watch.faulty()).unwrap();
     let mut contacts = Vec::new();
@@ -207,6 +211,27 @@ fn open_and_shorted_electrodes_change_no_answer_of_the_esp32() {
 #[test]
 fn open_and_shorted_electrodes_change_no_answer_of_the_esp32c3() {
     left_out_everywhere(BoardModel::Esp32c3);
+}
+
+/// Two pads across the strip read the same under a press at its far end, and the ESP32's converters do not tell that they are not grounded together.
+#[test]
+fn across_a_narrow_strip_no_wires_touch() {
+    let bench = Bench::of(&Detector::preset("strip-13x60").unwrap());
+    let detector = bench.problem.detector();
+    let press =
+        |y_mm: f64, sheets: f64| Contact::flat(0.0, 1e-3 * y_mm, 0.002, sheets * detector.sheet_conductance_s());
+    let places = [-24.0, -12.0, 12.0, 24.0];
+    let presses: Vec<_> = places.iter().flat_map(|y_mm| [0.03, 0.1, 0.3].map(|sheets| press(*y_mm, sheets))).collect();
+    let suspected = threads::map(&presses, |press| {
+        let impedance_ohm = bench.fine.impedance_ohm(&[*press]).unwrap();
+        let (problem, frames) = bench.frames(BoardModel::Esp32, &impedance_ohm, None);
+        let mut solver = FaultTolerant::new(Method::Auto, &problem).unwrap();
+        frames.iter().for_each(|readings| drop(solver.solve(readings).unwrap()));
+        assert!(solver.excluded().is_empty(), "{press:?}: {:?}", solver.excluded());
+        let alone = faulty_electrodes(&frames[FRAMES - 1], problem.detector()).unwrap_or_default();
+        alone.iter().any(|(_, fault)| *fault == ElectrodeFault::Shorted)
+    });
+    assert!(suspected.contains(&true), "the readings alone say nothing of touching wires, so this tests nothing");
 }
 
 /// Pairs of neighbours, of electrodes far apart, and across the ESP32's converters.

@@ -18,6 +18,7 @@
 //!
 //! A current that crowds at the rim has the fields of an even one on a wider disc. What is fitted is the radius of that disc, the spread.
 
+use crate::head::Head;
 use crate::normal::PARAMETERS;
 use crate::table::{MAX_ELECTRODES, Sample, Table};
 
@@ -34,6 +35,10 @@ const CROWDED_WIDER: f32 = 1.0 / 3.0;
 const OWN_ERROR: f32 = 0.03;
 /// Steps in which crowding and radius are found, each of the other.
 const CROWDING_STEPS: usize = 3;
+/// Share of a number by which it is changed for a derivative.
+const STEP: f32 = 0.01;
+/// Changes of what drives the couples of currents.
+pub(crate) const TURNED: usize = 5;
 /// Largest conductance of a contact (sheet conductances): what is firmer makes no difference.
 const FIRMEST_SHEETS: f32 = 300.0;
 /// Smallest resistance of a contact with its own field, in those of even current: with less, fields are no longer those of contacts.
@@ -54,6 +59,31 @@ pub(crate) struct Spot {
 
 /// A vector over electrodes.
 pub(crate) type PerElectrode = [f32; MAX_ELECTRODES];
+
+/// How the current of a disc crowds.
+struct Disc {
+    radius_m: f32,
+    rest_ohm: f32,
+    moment_s_m2: f32,
+}
+
+impl Disc {
+    /// Of a disc whose current spreads so far, with an own field but for that on a deep layer, and a resistance with that of the crowded current.
+    fn of(head: &Head, spread_m: f32, field_ohm: f32, ohm: f32) -> Self {
+        let least_ohm = 1.0 / (FIRMEST_SHEETS * head.sheet_s);
+        let (mut crowded, mut radius_m, mut rest_ohm) = (0.5, spread_m, least_ohm);
+        for _ in 0..CROWDING_STEPS {
+            radius_m = spread_m / libm::sqrtf(1.0 + CROWDED_WIDER * crowded);
+            let even_ohm = head.even_ohm(radius_m);
+            rest_ohm = (ohm - field_ohm - even_ohm * (1.0 - CROWDED_LESS * crowded)).max(least_ohm);
+            // Crowded is so much of the current as the layer's resistance has of that of both.
+            crowded = even_ohm / (even_ohm + rest_ohm);
+        }
+        let (deep, thin) = (3.0 / (8.0 * head.top_s_per_m * radius_m), 1.0 / (core::f32::consts::TAU * head.sheet_s));
+        let of_layer = libm::sqrtf(deep * deep + thin * thin);
+        Self { radius_m, rest_ohm, moment_s_m2: radius_m * radius_m / (4.0 * rest_ohm + of_layer) }
+    }
+}
 
 /// One contact in the circuit.
 #[derive(Clone, Debug)]
@@ -78,10 +108,17 @@ pub(crate) struct Loaded {
     per_ln_radius: f32,
     /// Moment of current that a slope of potential drives (S m2).
     pub moment_s_m2: f32,
+    /// Half of its derivatives by the parameters.
+    pub half_moment_by: [f32; PARAMETERS],
     /// Currents for 1 A into each electrode.
     pub currents: PerElectrode,
     /// Slopes of the potential along x and y (ohm/m), likewise.
     pub slopes_ohm_per_m: [PerElectrode; 2],
+    /// Of them what drives the couples of currents (ohm/m): what walls and pads do with the contact's own current, half of the slope of its own field.
+    pub driving_ohm_per_m: [PerElectrode; 2],
+    /// The moments that change with those as the place or the radius changes, in their units: for a step along x those along x and y, along y those along y (along
+    /// x they are those of the first along y), of the radius those along x and y.
+    pub turned: [PerElectrode; TURNED],
 }
 
 impl Loaded {
@@ -97,15 +134,12 @@ impl Loaded {
         even_ohm: 0.0,
         per_ln_radius: 0.0,
         moment_s_m2: 0.0,
+        half_moment_by: [0.0; PARAMETERS],
         currents: [0.0; MAX_ELECTRODES],
         slopes_ohm_per_m: [[0.0; MAX_ELECTRODES]; 2],
+        driving_ohm_per_m: [[0.0; MAX_ELECTRODES]; 2],
+        turned: [[0.0; MAX_ELECTRODES]; TURNED],
     };
-
-    /// Slope of the potential that drives the couple of currents along a direction, for 1 A into an electrode (ohm/m): that with what walls and pads
-    /// do with the contact's own current, half of the slope of its own field.
-    fn driving_ohm_per_m(&self, table: &Table<'_>, d: usize, e: usize) -> f32 {
-        self.slopes_ohm_per_m[d][e] - 0.5 * self.sample.slope[d][table.electrodes()] * self.currents[e]
-    }
 
     /// Puts a contact there.
     fn load(&mut self, table: &Table<'_>, spot: Spot) {
@@ -117,25 +151,43 @@ impl Loaded {
         table.sample(spot.at_m, per_m2 * (spread_m * spread_m - small_m2), &mut self.sample);
         self.share = self.sample.value[n + 1].clamp(LEAST_SHARE, 1.0);
         self.ohm = libm::expf(spot.ln_ohm).max(LEAST_OHM * (self.sample.value[n] + head.even_ohm(spread_m)));
-        let least_ohm = 1.0 / (FIRMEST_SHEETS * head.sheet_s);
-        let mut crowded = 0.5;
-        for _ in 0..CROWDING_STEPS {
-            self.radius_m = spread_m / libm::sqrtf(1.0 + CROWDED_WIDER * crowded);
-            self.even_ohm = head.even_ohm(self.radius_m);
-            let own_ohm = self.sample.value[n] + self.even_ohm * (1.0 - CROWDED_LESS * crowded);
-            self.rest_ohm = (self.ohm - own_ohm).max(least_ohm);
-            // Crowded is so much of the current as the layer's resistance has of that of both.
-            crowded = self.even_ohm / (self.even_ohm + self.rest_ohm);
-        }
-        let (deep, thin) =
-            (3.0 / (8.0 * head.top_s_per_m * self.radius_m), 1.0 / (core::f32::consts::TAU * head.sheet_s));
-        let of_layer = libm::sqrtf(deep * deep + thin * thin);
-        self.moment_s_m2 = self.radius_m * self.radius_m / (4.0 * self.rest_ohm + of_layer);
         self.per_ln_radius = 2.0 * per_m2 * spread_m * spread_m;
+        self.crowd(head, spread_m, n);
         for e in 0..n {
             self.by_radius_ohm[e] = self.per_ln_radius * self.sample.wider[e];
         }
         table.by_walls(&self.sample.value[..n], &mut self.walls_ohm);
+    }
+
+    /// Finds how the current crowds, and what moment a slope drives.
+    fn crowd(&mut self, head: &Head, spread_m: f32, n: usize) {
+        let (ohm, own_ohm) = (self.ohm, self.sample.value[n]);
+        let disc = Disc::of(head, spread_m, own_ohm, ohm);
+        (self.radius_m, self.rest_ohm, self.even_ohm) = (disc.radius_m, disc.rest_ohm, head.even_ohm(disc.radius_m));
+        self.moment_s_m2 = disc.moment_s_m2;
+        let half_by = |other: Disc, step: f32| 0.5 * (other.moment_s_m2 - disc.moment_s_m2) / step;
+        let by_ln_ohm = half_by(Disc::of(head, spread_m, own_ohm, ohm * (1.0 + STEP)), STEP);
+        let by_own = half_by(Disc::of(head, spread_m, own_ohm - STEP * ohm, ohm), -STEP * ohm);
+        let by_ln_radius = half_by(Disc::of(head, spread_m * (1.0 + STEP), own_ohm, ohm), STEP);
+        let by_place = |d: usize| by_own * head.radius_m * self.sample.slope[d][n];
+        let by_wider = by_own * self.per_ln_radius * self.sample.wider[n];
+        self.half_moment_by = [by_place(0), by_place(1), by_ln_ohm, by_ln_radius + by_wider];
+    }
+
+    /// Finds what drives the couples of currents at an electrode, and how that changes.
+    fn drive(&mut self, head: &Head, n: usize, e: usize) {
+        let (sample, half) = (&self.sample, 0.5 * self.currents[e]);
+        for d in 0..2 {
+            self.driving_ohm_per_m[d][e] = self.slopes_ohm_per_m[d][e] - half * sample.slope[d][n];
+        }
+        let by_place = self.moment_s_m2 * head.radius_m;
+        let by_radius = self.moment_s_m2 * self.per_ln_radius;
+        for (turned, bend) in self.turned.iter_mut().zip(&sample.bend) {
+            turned[e] = by_place * (bend[e] - half * bend[n]);
+        }
+        for (turned, slope) in self.turned[sample.bend.len()..].iter_mut().zip(&sample.wider_slope) {
+            turned[e] = by_radius * (slope[e] - half * slope[n]);
+        }
     }
 
     /// Conductance (S), with that of the part that is not on the detector.
@@ -272,6 +324,8 @@ impl Circuit {
                     self.loaded[k].slopes_ohm_per_m[d][e] = self.loaded[k].sample.slope[d][e] - by_others;
                 }
             }
+            let n = table.electrodes();
+            (0..n).for_each(|e| self.loaded[k].drive(table.head(), n, e));
         }
     }
 
@@ -279,7 +333,7 @@ impl Circuit {
         for g in 0..table.electrodes() {
             let mut ohm = table.pads_ohm(g, g) - self.constant_ohm[g] + table.head().on_resistance_ohm;
             for one in &self.loaded[..self.count] {
-                let [x, y] = [0, 1].map(|d| one.driving_ohm_per_m(table, d, g));
+                let [x, y] = [0, 1].map(|d| one.driving_ohm_per_m[d][g]);
                 ohm -= one.sample.value[g] * one.currents[g] + one.moment_s_m2 * (x * x + y * y);
             }
             if !(ohm > 0.0 && ohm.is_finite()) {
@@ -299,8 +353,8 @@ impl Circuit {
             let mut ohm = own_ohm - table.pads_ohm(e, g);
             for one in &self.loaded[..self.count] {
                 let along = |d: usize| {
-                    let here = one.driving_ohm_per_m(table, d, g);
-                    here * (here - one.driving_ohm_per_m(table, d, e))
+                    let here = one.driving_ohm_per_m[d][g];
+                    here * (here - one.driving_ohm_per_m[d][e])
                 };
                 ohm -= (one.sample.value[g] - one.sample.value[e]) * one.currents[g]
                     + one.moment_s_m2 * (along(0) + along(1));

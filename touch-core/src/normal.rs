@@ -1,6 +1,6 @@
 //! Normal equations of contacts, summed up row by row of a frame, and steps by them.
 
-use crate::circuit::{Circuit, MAX_CONTACTS, PerElectrode};
+use crate::circuit::{Circuit, Loaded, MAX_CONTACTS, PerElectrode, TURNED};
 use crate::frame::{Errors, Frame, left_v};
 use crate::table::{MAX_ELECTRODES, Table};
 
@@ -127,75 +127,90 @@ impl Normal {
     }
 }
 
+/// What the derivatives by a contact's parameters need of an electrode: numbers that are linear in the electrodes, so that a sum over these will do too.
+#[derive(Clone, Copy, Default)]
+struct Pattern {
+    current: f32,
+    /// Changes of the field at the contact for a step of its place along x and along y, in usual radii, and of its radius' logarithm (ohm).
+    along: [f32; 3],
+    driving: [f32; 2],
+    turned: [f32; TURNED],
+}
+
+impl Pattern {
+    /// Of a contact, summed over electrodes by `sum`.
+    fn of(one: &Loaded, unit_m: f32, sum: impl Fn(&PerElectrode) -> f32) -> Self {
+        let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| unit_m * sum(slopes));
+        Self {
+            current: sum(&one.currents),
+            along: [x, y, sum(&one.by_radius_ohm)],
+            driving: one.driving_ohm_per_m.each_ref().map(&sum),
+            turned: one.turned.each_ref().map(&sum),
+        }
+    }
+
+    /// Derivatives of the impedance between two electrodes by the parameters (ohm).
+    fn changes_ohm(&self, other: &Self, one: &Loaded) -> [f32; PARAMETERS] {
+        let both = |a: f32, of_a: f32, b: f32, of_b: f32| a * of_b + b * of_a;
+        let moved = |p: usize| both(self.along[p], self.current, other.along[p], other.current);
+        let turned = |t: usize, d: usize| both(self.turned[t], self.driving[d], other.turned[t], other.driving[d]);
+        let driven = 2.0 * (self.driving[0] * other.driving[0] + self.driving[1] * other.driving[1]);
+        let fields = [
+            moved(0) + turned(0, 0) + turned(1, 1),
+            moved(1) + turned(1, 0) + turned(2, 1),
+            -one.ohm * self.current * other.current,
+            moved(2) + turned(3, 0) + turned(4, 1),
+        ];
+        let mut changes = one.half_moment_by.map(|half| -half * driven);
+        changes.iter_mut().zip(fields).for_each(|(change, field)| *change -= field);
+        changes
+    }
+}
+
 /// What the derivatives of a row's readings have in common.
 pub(crate) struct RowSlopes {
     /// Volts by ohm.
     per_ohm: f32,
     /// Places are in usual radii (m).
     unit_m: f32,
-    /// Of each contact: its current, its slopes and its derivative by radius at the grounded electrode.
-    current: [f32; MAX_CONTACTS],
-    along: [[f32; 3]; MAX_CONTACTS],
+    /// Of each contact at the grounded electrode.
+    own: [Pattern; MAX_CONTACTS],
     /// Change of the load by each parameter (ohm).
     own_ohm: Vector,
 }
 
 impl RowSlopes {
     pub fn new(circuit: &Circuit, g: usize, drive_v: f32, unit_m: f32) -> Self {
-        let mut all = Self {
-            per_ohm: -drive_v / circuit.loads_ohm[g],
-            unit_m,
-            current: [0.0; MAX_CONTACTS],
-            along: [[0.0; 3]; MAX_CONTACTS],
-            own_ohm: [0.0; MOST],
-        };
+        let own = [Pattern::default(); MAX_CONTACTS];
+        let mut all = Self { per_ohm: -drive_v / circuit.loads_ohm[g], unit_m, own, own_ohm: [0.0; MOST] };
         for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-            all.current[k] = one.currents[g];
-            all.along[k] = along(one.slopes_ohm_per_m.each_ref(), &one.by_radius_ohm, g, unit_m);
-            let [x, y, radius] = all.along[k].map(|along| -2.0 * along * all.current[k]);
-            let ohm = one.ohm * all.current[k] * all.current[k];
-            all.own_ohm[PARAMETERS * k..PARAMETERS * (k + 1)].copy_from_slice(&[x, y, ohm, radius]);
+            all.own[k] = Pattern::of(one, unit_m, |values| values[g]);
+            let changes_ohm = all.own[k].changes_ohm(&all.own[k], one);
+            all.own_ohm[PARAMETERS * k..PARAMETERS * (k + 1)].copy_from_slice(&changes_ohm);
         }
         all
     }
 
     /// Derivatives of a reading, of which `share` of the drive is predicted.
     fn of_reading(&self, circuit: &Circuit, e: usize, share: f32, slope: &mut Vector) {
-        let of_load = 1.0 - share;
-        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-            let (current, mine) = (one.currents[e], self.current[k]);
-            let here = along(one.slopes_ohm_per_m.each_ref(), &one.by_radius_ohm, e, self.unit_m);
-            let first = PARAMETERS * k;
-            let change = |d: usize| -(here[d] * mine + current * self.along[k][d]);
-            let changes_ohm = [change(0), change(1), one.ohm * current * mine, change(2)];
-            for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
-                slope[first + i] = self.per_ohm * (change_ohm - of_load * self.own_ohm[first + i]);
-            }
-        }
+        self.add(circuit, 1.0 - share, |values| values[e], slope);
     }
-}
 
-impl RowSlopes {
     /// Adds to `products` those of the row's derivatives with some volts, by what of the drive is predicted at each electrode.
     pub fn add_products(&self, circuit: &Circuit, volts: &[f32], shares: &[f32], products: &mut Vector) {
-        let of_load: f32 = volts.iter().zip(shares).map(|(volts, share)| volts * (1.0 - share)).sum();
+        let of_load = volts.iter().zip(shares).map(|(volts, share)| volts * (1.0 - share)).sum();
+        self.add(circuit, of_load, |values| volts.iter().zip(values).map(|(a, b)| a * b).sum(), products);
+    }
+
+    fn add(&self, circuit: &Circuit, of_load: f32, sum: impl Fn(&PerElectrode) -> f32, slope: &mut Vector) {
         for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-            let with = |values: &PerElectrode| volts.iter().zip(values).map(|(a, b)| a * b).sum::<f32>();
-            let current = with(&one.currents);
-            let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| self.unit_m * with(slopes));
-            let (mine, first) = (self.current[k], PARAMETERS * k);
-            let change = |d: usize, with: f32| -(with * mine + current * self.along[k][d]);
-            let changes = [change(0, x), change(1, y), one.ohm * current * mine, change(2, with(&one.by_radius_ohm))];
-            for (i, change) in changes.into_iter().enumerate() {
-                products[first + i] += self.per_ohm * (change - of_load * self.own_ohm[first + i]);
+            let first = PARAMETERS * k;
+            let changes_ohm = Pattern::of(one, self.unit_m, &sum).changes_ohm(&self.own[k], one);
+            for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
+                slope[first + i] += self.per_ohm * (change_ohm - of_load * self.own_ohm[first + i]);
             }
         }
     }
-}
-
-/// What a step of a contact's place along x, along y and of its radius changes in an electrode's field at it (ohm).
-fn along(slopes_ohm_per_m: [&PerElectrode; 2], by_radius_ohm: &PerElectrode, e: usize, unit_m: f32) -> [f32; 3] {
-    [unit_m * slopes_ohm_per_m[0][e], unit_m * slopes_ohm_per_m[1][e], by_radius_ohm[e]]
 }
 
 /// Cholesky factor of a damped normal matrix whose diagonal is scaled to one.

@@ -25,7 +25,7 @@ const MISFIT_DEVIATIONS: f32 = 5.0;
 const WORSE: f32 = 1.3;
 /// Steps at most where a contact is followed, and where it is searched.
 const FOLLOWING: usize = 4;
-const SEARCHING: usize = 12;
+const SEARCHING: usize = 20;
 /// Conductance (sheet conductances) above which more would change nothing.
 const SATURATED_SHEETS: f32 = 100.0;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
@@ -122,7 +122,11 @@ impl Solver {
         if is_lost && self.may_search() {
             found = self.search(found, task, &mut work);
             found = found.and_then(|fit| self.pruned(fit, task, &mut work));
-            self.look_for_more(found.as_ref(), task, &mut work);
+            found = found.map(|fit| self.completed(fit, task, &mut work));
+            found = found.map(|fit| self.exchanged(fit, task, &mut work));
+            found = found.map(|fit| self.reduced(fit, task, &mut work));
+            self.more &= found.is_some();
+            self.searched = found.map_or(0.0, |fit| fit.normal.cost);
             let fits = found.is_none_or(|fit| !is_misfit(&fit, readings));
             self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
             self.wait = if fits { 0 } else { self.patience };
@@ -176,15 +180,21 @@ impl Solver {
             return best;
         }
         let starts = candidates.map(|candidate| (candidate.gain > 0.0).then(|| Scene::default().with(candidate.spot)));
-        let one = self.best_of(&starts, task, work);
+        let one = self.best_of(&starts, USUAL_RADIUS, task, work);
         better(best, one.and_then(|one| self.grown(one, task, work)))
     }
 
-    /// The best fit of contacts of about the usual radius from some starts.
-    fn best_of(&mut self, starts: &[Option<Scene>; CANDIDATES], task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
+    /// The best fit from some starts.
+    fn best_of(
+        &mut self,
+        starts: &[Option<Scene>; CANDIDATES],
+        radius_deviation: f32,
+        task: Task<'_>,
+        work: &mut Working<'_>,
+    ) -> Option<Fit> {
         let mut best = None;
         for start in starts.iter().flatten() {
-            best = better(best, self.fit(*start, USUAL_RADIUS, SEARCHING, task, work));
+            best = better(best, self.fit(*start, radius_deviation, SEARCHING, task, work));
             if best.is_some_and(|best: Fit| !is_misfit(&best, task.readings())) {
                 break;
             }
@@ -202,15 +212,58 @@ impl Solver {
             }
             let candidates = self.beside(&at, task, work);
             let starts = candidates.map(|one| (one.gain > PAID * PARAMETER_PRICE).then(|| at.scene.with(one.spot)));
-            let Some(more) = self.best_of(&starts, task, work) else { return best };
+            let Some(more) = self.best_of(&starts, USUAL_RADIUS, task, work) else { return best };
             at = more;
         }
     }
 
-    /// Notes what contacts leave, and whether another one would explain enough of it.
-    fn look_for_more(&mut self, found: Option<&Fit>, task: Task<'_>, work: &mut Working<'_>) {
-        self.searched = found.map_or(0.0, |fit| fit.normal.cost);
-        self.more = found.is_some_and(|fit| self.beside(fit, task, work)[0].gain > FIRST_GAIN);
+    /// Contacts with those that are looked for beside them as long as one would explain much of what they leave; notes whether another one would.
+    fn completed(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
+        loop {
+            let candidates = self.beside(&best, task, work);
+            self.more = candidates[0].gain > FIRST_GAIN;
+            if !self.more || best.scene.count == MAX_CONTACTS {
+                return best;
+            }
+            let starts = candidates.map(|one| (one.gain > FIRST_GAIN).then(|| best.scene.with(one.spot)));
+            let new = self.best_of(&starts, ANY_RADIUS, task, work);
+            match new.filter(|new| score(new) < score(&best)) {
+                Some(new) => best = new,
+                None => return best,
+            }
+        }
+    }
+
+    /// Contacts that leave too much, with each in turn looked for anew beside the others: one that went astray early is held there by those that came after it.
+    fn exchanged(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
+        let (mut k, mut kept) = (0, 0);
+        while kept < best.scene.count && (self.more || is_misfit(&best, task.readings())) {
+            k %= best.scene.count;
+            let rest = self.fit(best.scene.without(k), USUAL_RADIUS, SEARCHING, task, work);
+            let new = rest.and_then(|rest| self.grown(rest, task, work)).and_then(|new| self.pruned(new, task, work));
+            let before = self.more;
+            let new = new.map(|new| self.completed(new, task, work));
+            match new.filter(|new| score(new) < score(&best) - PARAMETER_PRICE) {
+                Some(new) => (best, kept) = (new, 0),
+                None => (k, kept, self.more) = (k + 1, kept + 1, before),
+            }
+        }
+        best
+    }
+
+    /// Contacts without those that the others do as well without, once they are fitted anew: a second one that was found while the first was too small.
+    fn reduced(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
+        while best.scene.count > 1 {
+            let mut fewer = None;
+            for k in 0..best.scene.count {
+                fewer = better(fewer, self.fit(best.scene.without(k), ANY_RADIUS, SEARCHING, task, work));
+            }
+            match fewer.filter(|fewer| score(fewer) < score(&best)) {
+                Some(fewer) => best = fewer,
+                None => return best,
+            }
+        }
+        best
     }
 
     /// Where one more contact would explain most of what others leave.

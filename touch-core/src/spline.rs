@@ -1,12 +1,14 @@
 //! Uniform cubic B-splines: four weights an interval, with derivatives.
 
-/// Weights of the four coefficients about an interval, and their derivatives by the way through it.
+/// Weights of the four coefficients about an interval, and their first and second derivatives by the way through it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Weights {
     /// Of the value.
     pub value: [f32; 4],
     /// Of the derivative.
     pub slope: [f32; 4],
+    /// Of the second derivative.
+    pub bend: [f32; 4],
 }
 
 /// At a share `t` of the way through an interval, 0 to 1.
@@ -21,6 +23,7 @@ pub fn weights(t: f32) -> Weights {
             sixth * t2 * t,
         ],
         slope: [-0.5 * r * r, 1.5 * t2 - 2.0 * t, -1.5 * t2 + t + 0.5, 0.5 * t2],
+        bend: [r, 3.0 * t - 2.0, 1.0 - 3.0 * t, t],
     }
 }
 

@@ -172,12 +172,22 @@ pub(crate) struct Sample {
     pub value: [f32; QUANTITIES],
     /// Derivatives by x and y (1/m).
     pub slope: [[f32; QUANTITIES]; 2],
-    /// Those of the wide disc less those of the small one.
+    /// Second derivatives by x twice, by x and y, by y twice (1/m2).
+    pub bend: [[f32; QUANTITIES]; 3],
+    /// Values of the wide disc less those of the small one.
     pub wider: [f32; QUANTITIES],
+    /// Derivatives of that by x and y (1/m).
+    pub wider_slope: [[f32; QUANTITIES]; 2],
 }
 
 impl Sample {
-    pub const NONE: Self = Self { value: [0.0; QUANTITIES], slope: [[0.0; QUANTITIES]; 2], wider: [0.0; QUANTITIES] };
+    pub const NONE: Self = Self {
+        value: [0.0; QUANTITIES],
+        slope: [[0.0; QUANTITIES]; 2],
+        bend: [[0.0; QUANTITIES]; 3],
+        wider: [0.0; QUANTITIES],
+        wider_slope: [[0.0; QUANTITIES]; 2],
+    };
 }
 
 impl<'a> Table<'a> {
@@ -342,6 +352,11 @@ impl<'a> Table<'a> {
                 let value = along_x.value[column] * along_y.value[row];
                 let slope_x = along_x.slope[column] * along_y.value[row] * per_m[0];
                 let slope_y = along_x.value[column] * along_y.slope[row] * per_m[1];
+                let bend = [
+                    along_x.bend[column] * along_y.value[row] * per_m[0] * per_m[0],
+                    along_x.slope[column] * along_y.slope[row] * per_m[0] * per_m[1],
+                    along_x.value[column] * along_y.bend[row] * per_m[1] * per_m[1],
+                ];
                 let codes = self.coefficient(i + column, j + row);
                 let (small, large) = codes.split_at(count.min(codes.len()));
                 for (index, (small, large)) in small.iter().zip(large).enumerate() {
@@ -350,7 +365,12 @@ impl<'a> Table<'a> {
                     sample.value[index] += value * code;
                     sample.slope[0][index] += slope_x * code;
                     sample.slope[1][index] += slope_y * code;
+                    for (sum, bend) in sample.bend.iter_mut().zip(bend) {
+                        sum[index] += bend * code;
+                    }
                     sample.wider[index] += value * (large - small);
+                    sample.wider_slope[0][index] += slope_x * (large - small);
+                    sample.wider_slope[1][index] += slope_y * (large - small);
                 }
             }
         }

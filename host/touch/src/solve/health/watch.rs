@@ -1,7 +1,9 @@
 //! Which electrodes cannot be right, from frame to frame.
 //!
-//! One frame's verdict ([`electrodes`]) is believed after some frames in a row, so that no single frame costs an electrode. An electrode that
-//! was left out comes back after many frames that would have shown its fault and do not: with readings as large as when it was found.
+//! One frame's verdict ([`electrodes`]) is believed after some frames in a row, so that no single frame costs an electrode, and only while no
+//! contacts explain the frames: what sound wires read needs no fault. Two pads across a narrow strip read the same while something presses at
+//! its far end, and where one of them is grounded a converter's floor hides that the other is not. An electrode that was left out comes back
+//! after many frames that would have shown its fault and do not: with readings as large as when it was found.
 
 use crate::solve::answer::{ElectrodeFault, Solution};
 use crate::solve::health::electrodes;
@@ -69,6 +71,8 @@ pub struct ElectrodeWatch {
     /// Answers with contacts since a look at what was exchanged, and whether the newest is one.
     touched: u32,
     is_touched: bool,
+    /// Whether the newest answer is contacts that leave no more than noise.
+    is_explained: bool,
 }
 
 /// An electrode's history.
@@ -110,6 +114,7 @@ impl ElectrodeWatch {
             looks: 0,
             touched: 0,
             is_touched: false,
+            is_explained: false,
         }
     }
 
@@ -174,7 +179,8 @@ impl ElectrodeWatch {
         for (electrode, case) in self.cases.iter_mut().enumerate() {
             let fault = faulty.iter().find(|(wrong, _)| *wrong == electrode);
             let is_known = self.faulty.faults.iter().any(|(known, _)| *known == electrode);
-            case.seen = if fault.is_some() && !is_known { case.seen + 1 } else { 0 };
+            let is_seen = fault.is_some() && !is_known && !self.is_explained;
+            case.seen = if is_seen { case.seen + 1 } else { 0 };
             found.extend(fault.filter(|_| case.seen >= CONFIRMED));
         }
         if found.is_empty() || !self.exclude(&found) {
@@ -211,8 +217,9 @@ impl ElectrodeWatch {
 
     /// Takes note of an answer. Exchanged wires make several contacts of one, which may well fit, or none that fits.
     pub fn answered(&mut self, solution: &Solution) {
-        let is_one_at_most = solution.is_contacts() && solution.contacts.len() <= 1;
-        if !is_one_at_most || solution.flags.misfit {
+        let is_fit = solution.is_contacts() && !solution.flags.misfit;
+        self.is_explained = is_fit && !solution.flags.unfinished;
+        if !is_fit || solution.contacts.len() > 1 {
             self.doubts += 1;
         } else if !solution.flags.unfinished {
             (self.doubts, self.looks) = (0, 0);
