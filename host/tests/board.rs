@@ -84,7 +84,7 @@ fn image_of(board: &str) -> Vec<u8> {
 fn an_image_for_another_board_or_none_is_told_before_a_tool_is_called() {
     let tools = Tools::new("images", "espflash", 0);
     let of_c3 = image_of("esp32c3");
-    let long = elf(243, 0x4200_0020, (0x3c00_0000, 0x3f_0000), 0x4200_0020);
+    let long = elf(243, 0x4200_0020, (0x3c00_0000, 0x3d_0000), 0x4200_0020);
     let part = [&of_c3[..16], &1u16.to_le_bytes(), &of_c3[18..]].concat();
     for (image, board, told) in [
         (&b""[..], "esp32c3", "it is empty"),
@@ -96,10 +96,15 @@ fn an_image_for_another_board_or_none_is_told_before_a_tool_is_called() {
         (&image_of("stm32f405"), "esp32c3", "for the processor ARM"),
         (&of_c3, "esp32c6", "0x3fc80000, where the esp32c6 has no memory"),
         (&image_of("esp32c6"), "esp32c3", "built for another chip"),
+        (
+            &elf(40, 0x0800_0000, (0x080d_ffff, 8), 0x0800_0000),
+            "stm32f405",
+            "0x080dffff, where the stm32f405 has no memory",
+        ),
         (&elf(243, 0x4200_0020, (0x3fc8_0000, 8), 0), "esp32c3", "it begins at 0x00000000"),
         (&elf(243, 0x4200_0020, (0x3fc8_0000, 8), 0x3fc8_0000), "esp32c3", "where it has no code"),
         (&part, "esp32c3", "not linked yet"),
-        (&long, "esp32c3", "4128784 bytes of flash"),
+        (&long, "esp32c3", "3997712 bytes of flash"),
     ] {
         let path = tools.file("some.elf", image);
         let (code, message) = tools.flash(&[board, "--image", path.to_str().unwrap()], &tools.0);

@@ -68,14 +68,11 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
         if at != self.held || self.usable.is_some() {
             return true;
         }
-        if !self.store.write(at, bytes) {
-            return false;
-        }
-        let end = at + bytes.len();
-        self.held = end;
-        match self.store.bytes().get(..end).and_then(Table::announced_bytes) {
-            Some(length) if length > self.store.bytes().len() || length < end => self.refuse(),
-            Some(length) if length == end => self.finish(length),
+        let Some(held) = self.store.write(at, bytes) else { return false };
+        self.held = held;
+        match self.store.bytes().get(..held).and_then(Table::announced_bytes) {
+            Some(length) if length > self.store.bytes().len() || length < held => self.refuse(),
+            Some(length) if length == held => self.finish(length),
             _ => true,
         }
     }

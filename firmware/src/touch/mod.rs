@@ -3,6 +3,7 @@
 mod cells;
 mod digitizer;
 mod finder;
+mod flash;
 mod input;
 mod rest;
 mod store;
@@ -11,6 +12,7 @@ use tactomo_protocol::{Contacts, Hello, Output, Scope, TablePiece, TableState};
 
 pub use self::digitizer::Digitizer;
 pub use self::finder::ContactFinder;
+pub use self::flash::{FlashStore, RamCopy, View};
 pub use self::store::{RamStore, TableStore};
 use crate::scan::Scanned;
 

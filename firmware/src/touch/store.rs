@@ -5,15 +5,15 @@ pub trait TableStore {
     /// All bytes of the store: those of a table that was kept, or of anything.
     fn bytes(&self) -> &[u8];
 
-    /// Writes bytes of a new table, the first at 0, each where the one before ended; returns whether it could. The first may take as long as flash takes to be
-    /// erased.
-    fn write(&mut self, at: usize, bytes: &[u8]) -> bool;
+    /// Writes bytes of a new table, the first at 0, each where the one before ended; returns how many bytes of it are there: where to go on, which is 0 if it has
+    /// to come anew. `None` if it cannot be written. The first may take as long as flash takes to be erased.
+    fn write(&mut self, at: usize, bytes: &[u8]) -> Option<usize>;
 
     /// The table is whole and sound, and has so many bytes: it is to be found here after a reset; returns whether it will.
     fn keep(&mut self, length: usize) -> bool;
 }
 
-/// A table in memory, which a reset forgets: for boards without flash of their own, for tests, and for the simulated board.
+/// A table in memory, which a reset forgets: for boards that have no flash to spare, for tests, and for the simulated board.
 #[derive(Debug)]
 pub struct RamStore<B>(B);
 
@@ -29,9 +29,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> TableStore for RamStore<B> {
         self.0.as_ref()
     }
 
-    fn write(&mut self, at: usize, bytes: &[u8]) -> bool {
-        let place = self.0.as_mut().get_mut(at..).and_then(|rest| rest.get_mut(..bytes.len()));
-        place.map(|place| place.copy_from_slice(bytes)).is_some()
+    fn write(&mut self, at: usize, bytes: &[u8]) -> Option<usize> {
+        self.0.as_mut().get_mut(at..)?.get_mut(..bytes.len())?.copy_from_slice(bytes);
+        Some(at + bytes.len())
     }
 
     fn keep(&mut self, _length: usize) -> bool {

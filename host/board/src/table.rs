@@ -10,9 +10,9 @@ use tactomo_protocol::{
 use crate::link::Link;
 use crate::session;
 
-/// How long a board has to answer, and how often it is asked: a board that erases flash for the first piece takes up to 2 s (128 kB of an STM32F405; its
-/// data sheet), all others some milliseconds.
-const PATIENCE: Duration = Duration::from_secs(4);
+/// How long a board has to answer, and how often it is asked. A board that erases flash for the first piece takes up to 4 s (128 kB of an STM32F405, bytes
+/// written one at a time; its data sheet, "Flash memory programming"), or for one in 64 up to 0.4 s (4 kB behind an ESP32); all others some milliseconds.
+const PATIENCE: Duration = Duration::from_secs(6);
 const TRIES: u32 = 3;
 /// Tags of commands go on from here, away from those of whoever has asked for Hello.
 const FIRST_TAG: u8 = 127;

@@ -10,9 +10,9 @@ mod line;
 
 use esp_hal::clock::CpuClock;
 use esp_hal::timer::timg::TimerGroup;
-use tactomo_board_espressif::{EspChip, brown_out, output, run};
+use tactomo_board_espressif::{EspChip, brown_out, finder, output, run};
+use tactomo_firmware::Parts;
 use tactomo_firmware::mux::{Enabled, Transparent};
-use tactomo_firmware::{NoTouch, Parts};
 
 use crate::inputs::InputPins;
 use crate::line::UartLine;
@@ -48,7 +48,7 @@ fn main() -> ! {
         sampler: inputs::new(chip.ADC1, chip.ADC2, pins),
         serial: UartLine::new(chip.UART0, chip.GPIO1, chip.GPIO3),
         chip: EspChip::new(TimerGroup::new(chip.TIMG0)),
-        touch: NoTouch,
+        touch: finder(chip.FLASH),
     };
     run("esp32", inputs::adc(), parts)
 }

@@ -8,9 +8,9 @@ use esp_hal::clock::CpuClock;
 use esp_hal::timer::timg::TimerGroup;
 use tactomo_board_espressif::one_input::OneInput;
 use tactomo_board_espressif::usb_line::UsbLine;
-use tactomo_board_espressif::{EspChip, output, run};
+use tactomo_board_espressif::{EspChip, finder, output, run};
+use tactomo_firmware::Parts;
 use tactomo_firmware::mux::{LatchLines, Latched};
-use tactomo_firmware::{NoTouch, Parts};
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
@@ -25,7 +25,7 @@ fn main() -> ! {
         sampler: OneInput::new(chip.ADC1, chip.GPIO0),
         serial: UsbLine::new(chip.USB_DEVICE),
         chip: EspChip::new(TimerGroup::new(chip.TIMG0)),
-        touch: NoTouch,
+        touch: finder(chip.FLASH),
     };
     run("esp32c6", OneInput::adc(), parts)
 }

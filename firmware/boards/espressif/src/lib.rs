@@ -7,6 +7,7 @@ pub mod brown_out;
 mod chip;
 #[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
 pub mod one_input;
+mod table;
 #[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
 pub mod usb_line;
 
@@ -18,10 +19,11 @@ use esp_hal::ram;
 use esp_hal::rtc_cntl::SocResetReason;
 use tactomo_board_common::{PanicRecord, RECORD_BYTES, Reset};
 use tactomo_firmware::mux::Mux;
-use tactomo_firmware::{Adc, Board16, Chip, Identity, Parts, Sampler, Serial};
+use tactomo_firmware::{Adc, Board16, Chip, Identity, Parts, Sampler, Serial, Touch};
 use tactomo_protocol::Fault;
 
 pub use chip::EspChip;
+pub use table::{Finder, finder};
 
 /// Electrodes of each of these boards.
 pub const ELECTRODES: u8 = 16;
@@ -29,12 +31,13 @@ pub const ELECTRODES: u8 = 16;
 const DRIVE_MV: u16 = 2000;
 
 /// Runs a board of that name: tells what led to the last reset, answers and scans, and never returns.
-pub fn run<M, S, L, C>(name: &str, adc: Adc, parts: Parts<M, S, L, C>) -> !
+pub fn run<M, S, L, C, T>(name: &str, adc: Adc, parts: Parts<M, S, L, C, T>) -> !
 where
     M: Mux<Error = Infallible>,
     S: Sampler,
     L: Serial,
     C: Chip,
+    T: Touch,
 {
     let identity = Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),

@@ -5,6 +5,7 @@
 #![no_main]
 
 mod chip;
+mod flash;
 mod inputs;
 mod line;
 #[cfg(feature = "hid")]
@@ -16,8 +17,6 @@ use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 use tactomo_board_common::WATCHDOG_TIMEOUT_MS;
-#[cfg(not(feature = "hid"))]
-use tactomo_firmware::NoTouch;
 use tactomo_firmware::mux::Transparent;
 use tactomo_firmware::{Board16, Identity, Parts};
 
@@ -58,14 +57,9 @@ fn main() -> ! {
     let usb =
         USB::new((device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK), (a.pa11, a.pa12), &rcc.clocks);
     let Some(serial) = UsbLine::new(usb) else { panic!("the USB port has no room for its names") };
-    #[cfg(not(feature = "hid"))]
-    let touch = NoTouch;
-    // A store without room: contacts are not found yet.
+    let touch = flash::finder(device.FLASH);
     #[cfg(feature = "hid")]
-    let touch = {
-        let finder = tactomo_firmware::ContactFinder::new(tactomo_firmware::RamStore::new([]));
-        tactomo_firmware::Digitizer::<_, _, { ELECTRODES as usize * ELECTRODES as usize }>::new(finder, serial.screen)
-    };
+    let touch = tactomo_firmware::Digitizer::new(touch, serial.screen);
     let mut counter = device.TIM2.counter_us(&mut rcc);
     if counter.start(u32::MAX.micros()).is_err() {
         panic!("the clock does not start");
