@@ -61,7 +61,7 @@ pub enum NewBoardError {
 /// What a step did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activity {
-    /// Nothing to scan until the host says so.
+    /// Nothing to scan until the host says so, or gives a table to a board that needs no host.
     Idle,
     /// Nothing to scan before this board time (us): the frame-rate cap.
     Waiting {
@@ -70,7 +70,7 @@ pub enum Activity {
     },
     /// One row of a frame.
     Row,
-    /// The last row of a frame, which is to be sent.
+    /// The last row of a frame, which is to be sent if anybody streams.
     Frame,
 }
 
@@ -215,6 +215,9 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
             Command::Output(output) => self.choose(output, answers)?,
             Command::Table(piece) => {
                 let fits = self.parts.touch.take(&piece);
+                if self.parts.touch.needs_frames() && !self.scan.plan().is_whole() {
+                    self.scan.set_plan(Plan::default());
+                }
                 self.uplink.message(&BoardMessage::Table(TableState { answers, ..self.parts.touch.table() }));
                 return if fits { Ok(()) } else { Err(Fault::NoTable { answers }) };
             }
@@ -236,13 +239,22 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
 
     fn start(&mut self) {
         if !self.hello.is_streaming {
+            // One that was scanned all the time knows of rest, and of what touches.
+            if !self.scans() {
+                self.parts.touch.restart();
+            }
             self.hello.is_streaming = true;
             self.stuck_reported = false;
             // Who starts it may be another host than before.
             self.uplink.forget_keys();
-            self.parts.touch.restart();
+            self.scan.abandon();
             self.restart_pace();
         }
+    }
+
+    /// Whether there is anything to scan for.
+    fn scans(&self) -> bool {
+        self.hello.is_streaming || self.parts.touch.needs_frames()
     }
 
     /// Ends the stream; a frame that is already on its way may follow.
@@ -262,7 +274,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
 
     /// Takes a plan over; the frame under way is abandoned without a number.
     fn follow(&mut self, plan: Plan, answers: u8) -> Result<(), Fault> {
-        if !self.scan.set_plan(plan) {
+        let needs_all = !plan.is_whole() && self.parts.touch.needs_frames();
+        if needs_all || !self.scan.set_plan(plan) {
             return Err(Fault::BadPlan { answers });
         }
         self.restart_pace();
@@ -275,7 +288,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
     }
 
     fn scan_if_due(&mut self) -> Result<Activity, M::Error> {
-        if !self.hello.is_streaming {
+        if !self.scans() {
             return Ok(Activity::Idle);
         }
         if !self.scan.is_under_way() {
@@ -291,8 +304,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
 
     fn scan_row(&mut self) -> Result<Activity, M::Error> {
         let Self { parts, scan, uplink, inbox, .. } = self;
-        let Parts { mux, sampler, serial, chip, .. } = parts;
-        let line = &mut Line { uplink, serial, inbox };
+        let Parts { mux, sampler, serial, chip, touch } = parts;
+        let line = &mut Line { uplink, serial, inbox, waits: !touch.needs_frames() };
         let mut front_end = FrontEnd { mux, sampler, chip, line, adc: self.adc, settings: self.hello.settings };
         match scan.row(&mut front_end)? {
             None => Ok(Activity::Row),
@@ -304,7 +317,9 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
     }
 
     fn send(&mut self, scanned: Scanned) {
-        if scanned.stuck && !self.stuck_reported {
+        // What is scanned for the touch part alone goes nowhere else.
+        let is_silent = self.parts.touch.needs_frames() && !self.hello.is_streaming;
+        if scanned.stuck && !self.stuck_reported && !is_silent {
             self.fault(Fault::AdcStuck);
         }
         self.stuck_reported = scanned.stuck;
@@ -312,11 +327,13 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
         let Parts { serial, chip, touch, .. } = parts;
         let mut attend = || {
             chip.feed_watchdog();
-            Line { uplink, serial, inbox }.transfer(chip);
+            Line { uplink, serial, inbox, waits: true }.transfer(chip);
         };
         let contacts = touch.contacts(&scanned, scan.scope(), scan.readings(), &mut attend);
-        let readings = touch.output().has_frames().then(|| (scan.scope(), scan.readings()));
-        uplink.frame(&scanned, readings, contacts);
+        if !is_silent {
+            let readings = touch.output().has_frames().then(|| (scan.scope(), scan.readings()));
+            uplink.frame(&scanned, readings, contacts);
+        }
     }
 
     /// Says Hello in answer to the command with this tag, or, with 0, by itself.
@@ -334,11 +351,13 @@ struct Line<'a, L, const READINGS: usize, const WIRE: usize> {
     uplink: &'a mut Uplink<READINGS, WIRE>,
     serial: &'a mut L,
     inbox: &'a mut Inbox,
+    /// Whether frames wait for it.
+    waits: bool,
 }
 
 impl<L: Serial, C: Chip, const READINGS: usize, const WIRE: usize> Attended<C> for Line<'_, L, READINGS, WIRE> {
     fn has_room(&self) -> bool {
-        self.uplink.has_room()
+        !self.waits || self.uplink.has_room()
     }
 
     fn push(&mut self, chip: &mut C) {

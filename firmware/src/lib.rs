@@ -8,7 +8,7 @@
 //! | converter | [`Sampler`] | bounded conversions of the electrodes' voltages, one by one or a row at a time |
 //! | serial line | [`Serial`] | a UART or USB port that never waits |
 //! | chip | [`Chip`] | clock, delay, watchdog, log bytes |
-//! | touch | [`Touch`] | [`NoTouch`], or a [`ContactFinder`] with a [`TableStore`]: contacts without a computer |
+//! | touch | [`Touch`] | [`NoTouch`], or a [`ContactFinder`] with a [`TableStore`]: contacts without a computer; a [`Digitizer`] around it is a touch screen ([`hid`]) too |
 //!
 //! ```ignore
 //! let mut board = Board16::new(Parts { mux, sampler, serial, chip, touch: NoTouch }, IDENTITY)?;
@@ -23,6 +23,7 @@
 
 mod adc;
 mod board;
+pub mod hid;
 mod inbox;
 #[cfg(feature = "defmt")]
 pub mod log;
@@ -45,4 +46,4 @@ pub use parts::{Chip, Parts, Sampler, Serial, TimedOut};
 pub use row::Row;
 pub use scan::Scanned;
 pub use side_by_side::{ConverterPair, SideBySide};
-pub use touch::{ContactFinder, FlashStore, NoTouch, RamCopy, RamStore, TableStore, Touch, View};
+pub use touch::{ContactFinder, Digitizer, FlashStore, NoTouch, RamCopy, RamStore, TableStore, Touch, View};

@@ -291,12 +291,16 @@ impl<'a> Table<'a> {
         self.mask.get(index / 8).is_some_and(|byte| byte >> (index % 8) & 1 == 1)
     }
 
-    /// The nearest place of the rectangle that the grid covers (m).
+    /// Lowest and highest corner of the rectangle that the grid covers, which is the detector's own (m).
+    pub fn bounds_m(&self) -> [[f32; 2]; 2] {
+        let ([columns, rows], Head { left_m, bottom_m, step_x_m, step_y_m, .. }) = (self.cells(), self.head);
+        [[left_m, bottom_m], [left_m + columns as f32 * step_x_m, bottom_m + rows as f32 * step_y_m]]
+    }
+
+    /// The nearest place of that rectangle (m).
     pub(crate) fn held(&self, [x_m, y_m]: [f32; 2]) -> [f32; 2] {
-        let [columns, rows] = self.cells();
-        let right_m = self.head.left_m + columns as f32 * self.head.step_x_m;
-        let top_m = self.head.bottom_m + rows as f32 * self.head.step_y_m;
-        [x_m.max(self.head.left_m).min(right_m), y_m.max(self.head.bottom_m).min(top_m)]
+        let [low_m, high_m] = self.bounds_m();
+        [x_m.max(low_m[0]).min(high_m[0]), y_m.max(low_m[1]).min(high_m[1])]
     }
 
     /// The cell of a place, and the shares of the ways through it.

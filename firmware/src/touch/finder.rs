@@ -41,6 +41,13 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
         }
     }
 
+    /// Lowest and highest corner of the detector (m), if there is a table of it.
+    pub fn bounds_m(&self) -> Option<[[f32; 2]; 2]> {
+        self.usable?;
+        let table = Table::read_again(self.store.bytes().get(..self.held)?).ok()?;
+        Some(table.bounds_m())
+    }
+
     /// The table in the store's first bytes, if it is sound and one of this board.
     fn sound(&self, length: usize) -> Option<TableId> {
         let bytes = self.store.bytes().get(..length)?;

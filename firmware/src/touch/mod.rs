@@ -1,6 +1,7 @@
 //! Contacts on the board itself: what a board can be asked for beside frames, and how a table comes to it.
 
 mod cells;
+mod digitizer;
 mod finder;
 mod flash;
 mod input;
@@ -9,12 +10,13 @@ mod store;
 
 use tactomo_protocol::{Contacts, Hello, Output, Scope, TablePiece, TableState};
 
+pub use self::digitizer::Digitizer;
 pub use self::finder::ContactFinder;
 pub use self::flash::{FlashStore, RamCopy, View};
 pub use self::store::{RamStore, TableStore};
 use crate::scan::Scanned;
 
-/// What a board makes of its readings: [`NoTouch`], or a [`ContactFinder`].
+/// What a board makes of its readings: [`NoTouch`], a [`ContactFinder`], or a [`Digitizer`] around one.
 pub trait Touch {
     /// Who the board is; comes once, before all else.
     fn meet(&mut self, hello: &Hello);
@@ -34,7 +36,12 @@ pub trait Touch {
     /// Begins anew, as a stream begins: the detector is taken to be at rest.
     fn restart(&mut self);
 
-    /// The contacts of a frame, if they are streamed. Whoever has something else to do is called by `attend` meanwhile.
+    /// Whether it needs whole frames, of each scan by itself, though nobody streams: its contacts go elsewhere than to the line.
+    fn needs_frames(&self) -> bool {
+        false
+    }
+
+    /// The contacts of a frame, if they are to be streamed. Whoever has something else to do is called by `attend` meanwhile.
     fn contacts(
         &mut self,
         scanned: &Scanned,

@@ -13,6 +13,7 @@ use tactomo::detector::Detector;
 use tactomo::scene::{Hand, Scene, SceneName};
 use tactomo::simulate::{Physics, Simulation};
 use tactomo::solve::{Problem, compile};
+use tactomo_firmware::hid::{LAST_PLACE, REPORT_BYTES, TOUCH_ID};
 use tactomo_protocol::{BoardMessage, Command, Fault, Frame, Plan, Scope, Settings, Status};
 
 use crate::host::Host;
@@ -21,10 +22,11 @@ use crate::qemu::{Qemu, Request};
 /// The table several times over.
 const FRAMES: usize = 4 * table::FRAMES;
 
-/// The board's firmware as it is, and with contacts.
+/// The board's firmware as it is, with contacts, and as a touch screen.
 struct Built {
     plain: PathBuf,
     contacts: PathBuf,
+    hid: PathBuf,
 }
 
 /// Builds the board once; `None` if the tools are missing and that is allowed.
@@ -33,7 +35,10 @@ fn built() -> Result<Option<&'static Built>> {
     if !qemu::available()? {
         return Ok(None);
     }
-    let build = || Ok(Built { plain: qemu::build(None)?, contacts: qemu::build(Some("contacts"))? });
+    let build = || {
+        let [plain, contacts, hid] = [None, Some("contacts"), Some("hid")].map(qemu::build);
+        Ok(Built { plain: plain?, contacts: contacts?, hid: hid? })
+    };
     let built = BUILT.get_or_init(|| build().map_err(|error: anyhow::Error| format!("{error:#}")));
     Ok(Some(built.as_ref().map_err(|error| anyhow::anyhow!("{error}"))?))
 }
@@ -156,29 +161,66 @@ fn a_panic_is_told_after_the_reset() -> Result<()> {
     Ok(())
 }
 
+/// Files that a machine finds in its memory: the default detector's table, and readings of fingers at these places (m).
+fn pressed(name: &str, places_m: &[[f64; 2]]) -> Result<[PathBuf; 2]> {
+    let detector = Detector::default();
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let files = ["table", "press"].map(|kind| folder.join(format!("virt.{name}.{kind}")));
+    std::fs::write(&files[0], compile(&Problem::of(&detector)?)?)?;
+    let hand = Hand::relative(&detector);
+    let scene = Scene::new(SceneName::Rest, &detector, hand, 1);
+    let mut simulation = Simulation::new(&detector, scene, &[], 1)?;
+    let tips = places_m.iter().filter_map(|at_m| hand.tip(*at_m, 0.5, 1.0).disc());
+    simulation.controls().press(tips.collect());
+    let readings = simulation.readings_v(0.0);
+    let codes = readings.volts().iter().flat_map(|volts| {
+        let code = (volts / detector.adc.lsb_v()).round();
+        (code as u16).to_le_bytes()
+    });
+    std::fs::write(&files[1], codes.collect::<Vec<_>>())?;
+    Ok(files)
+}
+
 /// Prints what contacts cost on a chip without floating-point hardware.
 #[test]
 fn contacts_cost_what_the_page_says() -> Result<()> {
     let Some(Built { contacts: elf, .. }) = built()? else { return Ok(()) };
-    let detector = Detector::default();
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let [table, press] = ["virt.table", "virt.press"].map(|name| folder.join(name));
-    std::fs::write(&table, compile(&Problem::of(&detector)?)?)?;
-    let hand = Hand::relative(&detector);
     let places_m = [[0.011, -0.007], [-0.014, 0.009], [0.002, 0.019]];
     for count in 1..=places_m.len() {
-        let scene = Scene::new(SceneName::Rest, &detector, hand, 1);
-        let mut simulation = Simulation::new(&detector, scene, &[], 1)?;
-        let tips = places_m[..count].iter().filter_map(|at_m| hand.tip(*at_m, 0.5, 1.0).disc());
-        simulation.controls().press(tips.collect());
-        let readings = simulation.readings_v(0.0);
-        let codes = readings.volts().iter().flat_map(|volts| {
-            let code = (volts / detector.adc.lsb_v()).round();
-            (code as u16).to_le_bytes()
-        });
-        std::fs::write(&press, codes.collect::<Vec<_>>())?;
-        let figures = qemu::measure_contacts(elf, &table, &press)?;
+        let [table, press] = pressed("cost", &places_m[..count])?;
+        let figures = qemu::press(elf, Request::MeasureContacts, &table, &press)?;
         print!("{count} contacts\n{figures}");
+    }
+    Ok(())
+}
+
+/// Without a host, a command or a program: a table is in its memory.
+#[test]
+fn a_board_that_is_a_touch_screen_tells_a_press_and_its_end_by_itself() -> Result<()> {
+    let Some(Built { hid: elf, .. }) = built()? else { return Ok(()) };
+    let place_m = [0.011, -0.007];
+    let [table, press] = pressed("hid", &[place_m])?;
+    let printed = qemu::press(elf, Request::Press, &table, &press)?;
+    let bytes = |line: &str| -> Option<Vec<u8>> {
+        let bytes = line.strip_prefix("report: ")?.split(' ');
+        bytes.map(|byte| u8::from_str_radix(byte, 16).ok()).collect()
+    };
+    let reports: Vec<_> = printed.lines().filter_map(bytes).collect();
+    let size_m = |name: &str| -> Result<f64> {
+        let um = printed.lines().find_map(|line| line.strip_prefix(name)).context("no size")?;
+        Ok(1e-6 * um.parse::<f64>()?)
+    };
+    let size_m = [size_m("width um: ")?, size_m("height um: ")?];
+    let (last, touching) = reports.split_last().context("no report")?;
+    // It lands in the first of 20 frames.
+    ensure!((15..20).contains(&touching.len()), "{printed}");
+    for report in &reports {
+        let is_last = std::ptr::eq(report, last);
+        ensure!(report.len() == REPORT_BYTES && report[0] == TOUCH_ID && report[REPORT_BYTES - 1] == 1, "{report:?}");
+        ensure!((report[1] == 1) != is_last && report[2] == 1, "{report:?}");
+        let place = |at: usize| f64::from(u16::from_le_bytes([report[at], report[at + 1]])) / f64::from(LAST_PLACE);
+        let at_m = [(place(3) - 0.5) * size_m[0], (0.5 - place(5)) * size_m[1]];
+        ensure!((at_m[0] - place_m[0]).hypot(at_m[1] - place_m[1]) < 1e-3, "{at_m:?}");
     }
     Ok(())
 }

@@ -19,6 +19,7 @@ pub enum Request {
     ExitOnStop = 2,
     Measure = 3,
     MeasureContacts = 4,
+    Press = 5,
 }
 
 /// Whether the tools are there; says what to install if they are not.
@@ -143,12 +144,12 @@ pub fn measure(elf: &Path) -> Result<String> {
     report(&mut machine(elf, Request::Measure))
 }
 
-/// Lets it measure what contacts cost, by the table in one file, in the readings in another; returns its report.
+/// Lets it do something with contacts, by the table in one file, in the readings in another; returns its report.
 ///
 /// # Errors
 /// If QEMU does not start or the board fails.
-pub fn measure_contacts(elf: &Path, table: &Path, readings: &Path) -> Result<String> {
-    let mut machine = machine(elf, Request::MeasureContacts);
+pub fn press(elf: &Path, request: Request, table: &Path, readings: &Path) -> Result<String> {
+    let mut machine = machine(elf, request);
     for (file, place) in [(table, "0x80200000"), (readings, "0x80220000")] {
         machine.arg("-device").arg(format!("loader,file={},addr={place},force-raw=on", file.display()));
     }

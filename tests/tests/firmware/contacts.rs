@@ -1,118 +1,17 @@
 //! Contacts that a board finds by itself, and the table that it finds them by.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-use std::sync::{Arc, LazyLock};
-
-use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo::detector::Detector;
-use tactomo::scene::{Contact, Hand, Scene, SceneName};
-use tactomo::simulate::{Physics, Simulation};
 use tactomo::solve::{Problem, compile};
-use tactomo_firmware::{ContactFinder, RamStore, TimedOut};
 use tactomo_protocol::{
     BoardMessage, Command, ContactFlags, Contacts, Fault, MAX_PIECE, Output, TablePiece, TableState,
 };
 
-use crate::parts::{NoMux, Outside, TestBoard, board_with, simple_board, step};
-
-/// Room for a table (bytes).
-const ROOM: usize = 128 * 1024;
-
-static DETECTOR: LazyLock<Detector> = LazyLock::new(Detector::default);
-static TABLE: LazyLock<Arc<[u8]>> = LazyLock::new(|| compile(&Problem::of(&DETECTOR).unwrap()).unwrap().into());
-
-type Sample = Box<dyn FnMut(u64, u8) -> Result<u16, TimedOut>>;
-type FindingBoard = TestBoard<NoMux, Sample, NoopDelay, ContactFinder<RamStore<Vec<u8>>, 256>>;
-
-/// A board whose store has these bytes, the voltages that it reads, and its outside.
-struct Bench {
-    board: FindingBoard,
-    volts: Rc<RefCell<Vec<f64>>>,
-    outside: Outside,
-    tag: u8,
-}
-
-impl Bench {
-    fn new(memory: Vec<u8>) -> Self {
-        let (outside, volts) = (Outside::default(), Rc::new(RefCell::new(vec![0.0; 256])));
-        let read = Rc::clone(&volts);
-        let sample: Sample = Box::new(move |number, _| {
-            let volts: f64 = read.borrow()[number as usize % 256];
-            // Noise of half a code, as a converter of little has.
-            let noise = ((number.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f64 / f64::from(1 << 24)) - 0.5;
-            Ok((volts / 3.3 * 4096.0 + 0.5 + noise).max(0.0) as u16)
-        });
-        let touch = ContactFinder::new(RamStore::new(memory));
-        let board = board_with(&outside, NoMux, sample, NoopDelay::new(), touch);
-        Self { board, volts, outside, tag: 0 }
-    }
-
-    fn with_table() -> Self {
-        let mut memory = TABLE.to_vec();
-        memory.resize(ROOM, 0);
-        Self::new(memory)
-    }
-
-    fn command(&mut self, command: Command) -> Vec<BoardMessage> {
-        self.tag = self.tag % 255 + 1;
-        self.outside.send_tagged(self.tag, command);
-        step(&mut self.board, 1);
-        self.outside.messages()
-    }
-
-    /// Sends a piece; what the board has then, and whether it refuses the piece.
-    fn piece(&mut self, at: usize, bytes: &[u8]) -> (TableState, bool) {
-        let piece = TablePiece { at: at as u32, bytes: bytes.iter().copied().collect() };
-        let messages = self.command(Command::Table(piece));
-        let state = messages.iter().find_map(|message| match message {
-            BoardMessage::Table(state) => Some(*state),
-            _ => None,
-        });
-        let refused = messages.contains(&BoardMessage::Fault(Fault::NoTable { answers: self.tag }));
-        (state.unwrap(), refused)
-    }
-
-    fn send(&mut self, table: &[u8]) -> (TableState, bool) {
-        let mut last = (TableState::default(), false);
-        for (number, bytes) in table.chunks(MAX_PIECE).enumerate() {
-            last = self.piece(number * MAX_PIECE, bytes);
-        }
-        last
-    }
-
-    /// Reads this from now on.
-    fn read(&mut self, simulation: &mut Simulation) {
-        *self.volts.borrow_mut() = simulation.readings_v(0.0).volts().to_vec();
-    }
-
-    /// Scans so many frames of this; the contacts that are sent.
-    fn scan(&mut self, simulation: &mut Simulation, frames: usize) -> Vec<Contacts> {
-        self.read(simulation);
-        step(&mut self.board, 16 * frames);
-        let contacts = |message| match message {
-            BoardMessage::Contacts(contacts) => Some(contacts),
-            _ => None,
-        };
-        self.outside.messages().into_iter().filter_map(contacts).collect()
-    }
-}
-
-fn simulation(contacts: &[Contact]) -> Simulation {
-    let scene = Scene::new(SceneName::Rest, &DETECTOR, Hand::relative(&DETECTOR), 1);
-    let simulation = Simulation::new(&DETECTOR, scene, &[], 1).unwrap();
-    simulation.controls().press(contacts.to_vec());
-    simulation
-}
-
-fn finger(at_m: [f64; 2]) -> Contact {
-    let hand = Hand::relative(&DETECTOR);
-    hand.tip(at_m, 0.5, 1.0).disc().unwrap()
-}
+use crate::bench::{Bench, DETECTOR, ROOM, TABLE, finder, finger, simulation, table_memory};
+use crate::parts::{Outside, simple_board, step};
 
 #[test]
 fn contacts_are_where_something_presses_and_follow_a_rest_that_is_known() {
-    let mut bench = Bench::with_table();
+    let mut bench = Bench::new(finder(table_memory()));
     bench.command(Command::Output(Output::Contacts));
     bench.command(Command::Start);
     let at_rest = bench.scan(&mut simulation(&[]), 80);
@@ -132,7 +31,7 @@ fn contacts_are_where_something_presses_and_follow_a_rest_that_is_known() {
 
 #[test]
 fn a_press_in_the_first_frame_is_told_and_rest_is_learned_when_it_goes() {
-    let mut bench = Bench::with_table();
+    let mut bench = Bench::new(finder(table_memory()));
     let mut pressing = simulation(&[finger([0.0, 0.01])]);
     bench.read(&mut pressing);
     bench.command(Command::Output(Output::Contacts));
@@ -147,7 +46,7 @@ fn a_press_in_the_first_frame_is_told_and_rest_is_learned_when_it_goes() {
 
 #[test]
 fn both_are_sent_under_one_number_and_frames_alone_again() {
-    let mut bench = Bench::with_table();
+    let mut bench = Bench::new(finder(table_memory()));
     bench.command(Command::Output(Output::Both));
     bench.command(Command::Start);
     step(&mut bench.board, 16 * 4);
@@ -169,7 +68,7 @@ fn both_are_sent_under_one_number_and_frames_alone_again() {
 
 #[test]
 fn without_a_table_contacts_are_refused_and_one_that_comes_in_pieces_is_used() {
-    let mut bench = Bench::new(vec![0; ROOM]);
+    let mut bench = Bench::new(finder(vec![0; ROOM]));
     let refused = bench.command(Command::Output(Output::Contacts));
     assert!(refused.contains(&BoardMessage::Fault(Fault::NoTable { answers: 1 })), "{refused:?}");
     let (empty, _) = bench.piece(0, &[]);
@@ -199,7 +98,7 @@ fn tables_that_are_damaged_or_of_another_detector_are_refused() {
     let stronger = Detector { drive_v: 3.0, ..DETECTOR.clone() };
     let of_another_drive = compile(&Problem::of(&stronger).unwrap()).unwrap();
     for (table, room) in [(&damaged, ROOM), (&other, 2 * ROOM), (&of_another_drive, ROOM), (&TABLE.to_vec(), 1000)] {
-        let mut bench = Bench::new(vec![0; room]);
+        let mut bench = Bench::new(finder(vec![0; room]));
         let mut was_refused = false;
         for (number, bytes) in table.chunks(MAX_PIECE).enumerate() {
             let (state, is_refused) = bench.piece(number * MAX_PIECE, bytes);
@@ -213,7 +112,7 @@ fn tables_that_are_damaged_or_of_another_detector_are_refused() {
 /// Any pieces in any order leave a table that is sound, or none.
 #[test]
 fn whatever_pieces_come_there_is_a_sound_table_or_none() {
-    let mut bench = Bench::new(vec![0; ROOM]);
+    let mut bench = Bench::new(finder(vec![0; ROOM]));
     let mut seed = 7u64;
     let mut random = move |below: usize| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

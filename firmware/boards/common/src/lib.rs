@@ -9,6 +9,8 @@ pub mod converters;
 pub mod panic_record;
 pub mod range;
 pub mod reset;
+#[cfg(feature = "usb")]
+pub mod usb_digitizer;
 
 pub use panic_record::{PanicRecord, RECORD_BYTES};
 pub use reset::Reset;

@@ -1,11 +1,14 @@
-//! The chip's own USB port, as a serial port.
+//! The chip's own USB port, as a serial port; with the feature `hid` as a touch screen too.
 
 use static_cell::{ConstStaticCell, StaticCell};
 use stm32f4xx_hal::otg_fs::{USB, UsbBus};
 use tactomo_firmware::Serial;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
-use usbd_serial::{SerialPort, USB_CLASS_CDC};
+use usbd_serial::SerialPort;
+
+#[cfg(feature = "hid")]
+use crate::touch_screen::TouchScreen;
 
 /// Vendor and product that are shared by serial ports of free designs, which tell themselves apart by their names.
 const IDS: UsbVidPid = UsbVidPid(0x16C0, 0x27DD);
@@ -17,6 +20,9 @@ static BUS: StaticCell<UsbBusAllocator<UsbBus<USB>>> = StaticCell::new();
 pub struct UsbLine {
     device: UsbDevice<'static, UsbBus<USB>>,
     port: SerialPort<'static, UsbBus<USB>>,
+    /// What the port is beside it.
+    #[cfg(feature = "hid")]
+    pub screen: TouchScreen,
 }
 
 impl UsbLine {
@@ -24,21 +30,40 @@ impl UsbLine {
     pub fn new(usb: USB) -> Option<Self> {
         let bus = BUS.init(UsbBus::new(usb, ENDPOINTS.take()));
         let port = SerialPort::new(bus);
+        #[cfg(feature = "hid")]
+        let screen = TouchScreen::new(bus);
         let names = StringDescriptors::default().manufacturer("Tactomo").product("Tactomo stm32f405");
-        let device = UsbDeviceBuilder::new(bus, IDS).device_class(USB_CLASS_CDC).strings(&[names]).ok()?.build();
-        Some(Self { device, port })
+        let device = UsbDeviceBuilder::new(bus, IDS).strings(&[names]).ok()?;
+        #[cfg(not(feature = "hid"))]
+        let device = device.device_class(usbd_serial::USB_CLASS_CDC);
+        // Another release, as systems keep what a device was by its numbers.
+        #[cfg(feature = "hid")]
+        let device = device.composite_with_iads().device_release(0x0011);
+        Some(Self {
+            device: device.build(),
+            port,
+            #[cfg(feature = "hid")]
+            screen,
+        })
+    }
+
+    fn poll(&mut self) {
+        #[cfg(not(feature = "hid"))]
+        self.device.poll(&mut [&mut self.port]);
+        #[cfg(feature = "hid")]
+        self.screen.poll(&mut self.device, &mut self.port);
     }
 }
 
 impl Serial for UsbLine {
     /// The host is answered here too: nothing else polls the port while a row is scanned.
     fn push(&mut self, bytes: &[u8]) -> usize {
-        self.device.poll(&mut [&mut self.port]);
+        self.poll();
         self.port.write(bytes).unwrap_or(0)
     }
 
     fn pull(&mut self, buffer: &mut [u8]) -> usize {
-        self.device.poll(&mut [&mut self.port]);
+        self.poll();
         // What was written last may wait for a full packet.
         let _ = self.port.flush();
         self.port.read(buffer).unwrap_or(0)

@@ -8,6 +8,8 @@ mod chip;
 mod flash;
 mod inputs;
 mod line;
+#[cfg(feature = "hid")]
+mod touch_screen;
 
 use stm32f4xx_hal::otg_fs::USB;
 use stm32f4xx_hal::pac::{CorePeripherals, Peripherals};
@@ -55,6 +57,9 @@ fn main() -> ! {
     let usb =
         USB::new((device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK), (a.pa11, a.pa12), &rcc.clocks);
     let Some(serial) = UsbLine::new(usb) else { panic!("the USB port has no room for its names") };
+    let touch = flash::finder(device.FLASH);
+    #[cfg(feature = "hid")]
+    let touch = tactomo_firmware::Digitizer::new(touch, serial.screen);
     let mut counter = device.TIM2.counter_us(&mut rcc);
     if counter.start(u32::MAX.micros()).is_err() {
         panic!("the clock does not start");
@@ -67,7 +72,7 @@ fn main() -> ! {
         sampler: inputs,
         serial,
         chip: StmChip::new(delay, counter, watchdog),
-        touch: flash::finder(device.FLASH),
+        touch,
     };
     let identity = Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),

@@ -44,10 +44,12 @@ pub enum Played {
     Table,
     /// A detector at rest, with noise.
     Rest,
-    /// One without noise, on which something presses from this scan on.
+    /// One without noise, on which something presses.
     Press {
-        /// The scan's number.
+        /// Number of the first scan in which it does.
         from: u32,
+        /// Of the first one after.
+        to: u32,
     },
 }
 
@@ -106,8 +108,8 @@ impl<'a> TableSampler<'a> {
         match self.played {
             Played::Table => of(TABLE.get(scan as usize % FRAMES)?),
             Played::Rest => Some(at_rest(scan, ground, electrode)),
-            Played::Press { from } if scan < from => Some(0),
-            Played::Press { .. } => of(press()),
+            Played::Press { from, to } if (from..to).contains(&scan) => of(press()),
+            Played::Press { .. } => Some(0),
         }
     }
 }

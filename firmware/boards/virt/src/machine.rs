@@ -45,6 +45,8 @@ pub enum Request {
     Measure,
     /// The same of contacts that are found in what was put into memory.
     MeasureContacts,
+    /// Print the reports of a touch screen that something presses for a while, and leave.
+    Press,
 }
 
 impl Request {
@@ -56,6 +58,7 @@ impl Request {
             2 => Self::ExitOnStop,
             3 => Self::Measure,
             4 => Self::MeasureContacts,
+            5 => Self::Press,
             _ => Self::Run,
         }
     }

@@ -35,17 +35,22 @@ const IDENTITY: Identity = Identity {
 const PRESSED_FROM: u32 = 80;
 /// Frames that a measurement of contacts counts after the search.
 const FOLLOWED_FRAMES: u64 = 32;
+/// Frames that something presses a touch screen, and as many after that.
+const PRESS_FRAMES: u32 = 20;
 /// Frames that a measurement counts after the first: every 32nd is sent as it is.
 const MEASURED_FRAMES: u64 = 4 * 32;
 
 /// What finds contacts: nothing, or, so that what a frame costs stays that of a board without, by a feature.
 #[cfg(not(feature = "contacts"))]
 type Finder = tactomo_firmware::NoTouch;
+#[cfg(all(feature = "contacts", not(feature = "hid")))]
+type Finder = tactomo_firmware::ContactFinder<Store, READINGS>;
+#[cfg(feature = "hid")]
+type Finder = tactomo_firmware::Digitizer<Store, Report, READINGS>;
 #[cfg(feature = "contacts")]
-type Finder = tactomo_firmware::ContactFinder<
-    tactomo_firmware::RamStore<&'static mut [u8]>,
-    { table::ELECTRODES * table::ELECTRODES },
->;
+type Store = tactomo_firmware::RamStore<&'static mut [u8]>;
+#[cfg(feature = "contacts")]
+const READINGS: usize = table::ELECTRODES * table::ELECTRODES;
 type VirtBoard<'a> = Board16<Transparent<AddressLine<'a>>, TableSampler<'a>, Line, VirtChip<'a>, Finder>;
 
 defmt::timestamp!("{=u64:us}", machine::now_us());
@@ -58,7 +63,8 @@ fn main() -> ! {
     let (levels, gauge) = (Cell::new(0), Gauge::default());
     let played = match request {
         Request::Measure => Played::Rest,
-        Request::MeasureContacts => Played::Press { from: PRESSED_FROM },
+        Request::MeasureContacts => Played::Press { from: PRESSED_FROM, to: u32::MAX },
+        Request::Press => Played::Press { from: PRESSED_FROM, to: PRESSED_FROM + PRESS_FRAMES },
         _ => Played::Table,
     };
     let parts = Parts {
@@ -75,6 +81,7 @@ fn main() -> ! {
     match request {
         Request::Measure => measure(&mut board, &gauge),
         Request::MeasureContacts => measure_contacts(&mut board, &gauge),
+        Request::Press => watch_press(&mut board),
         _ => serve(&mut board, request),
     }
 }
@@ -86,7 +93,10 @@ fn touch() -> Finder {
 
 #[cfg(feature = "contacts")]
 fn touch() -> Finder {
-    tactomo_firmware::ContactFinder::new(tactomo_firmware::RamStore::new(machine::table_memory()))
+    let finder = tactomo_firmware::ContactFinder::new(Store::new(machine::table_memory()));
+    #[cfg(feature = "hid")]
+    let finder = tactomo_firmware::Digitizer::new(finder, Report(Uart::new()));
+    finder
 }
 
 /// Serves the host, as a chip would.
@@ -148,6 +158,14 @@ fn measure_contacts(board: &mut VirtBoard, gauge: &Gauge) -> ! {
     machine::exit()
 }
 
+/// Runs without a host until a press is over, and leaves. The touch screen prints its reports.
+fn watch_press(board: &mut VirtBoard) -> ! {
+    for _ in 0..PRESSED_FROM + 2 * PRESS_FRAMES {
+        while !matches!(board.step(), Ok(Activity::Frame | Activity::Idle)) {}
+    }
+    machine::exit()
+}
+
 /// The line to the host: the UART, after what a measurement says in the host's place.
 struct Line {
     uart: Uart,
@@ -161,6 +179,7 @@ impl Line {
         let commands: &[Command] = match request {
             Request::Measure => &[Command::Start],
             Request::MeasureContacts => &[Command::Output(Output::Contacts), Command::Start],
+            Request::Press => &[],
             _ => return Self { uart: Uart::new(), command, command_length: 0 },
         };
         static mut NOWHERE: [u8; 8] = [0; 8];
@@ -201,6 +220,22 @@ impl Report {
             // Cannot fail: the UART takes any text.
             let _ = core::fmt::write(self, format_args!("{name}: {value}\n"));
         }
+    }
+}
+
+#[cfg(feature = "hid")]
+impl tactomo_firmware::hid::ReportSink for Report {
+    fn set_size(&mut self, size_m: [f32; 2]) {
+        let [x_um, y_um] = size_m.map(|m| (1e6 * m) as u64);
+        self.line(&[("width um", x_um), ("height um", y_um)]);
+    }
+
+    fn send(&mut self, report: &tactomo_firmware::hid::Report) -> bool {
+        // Cannot fail: the UART takes any text.
+        let _ = core::fmt::Write::write_str(self, "report:");
+        report.iter().for_each(|byte| _ = core::fmt::write(self, format_args!(" {byte:02x}")));
+        let _ = core::fmt::Write::write_str(self, "\n");
+        true
     }
 }
 
