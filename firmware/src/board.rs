@@ -333,6 +333,10 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
         if !is_silent {
             let readings = touch.output().has_frames().then(|| (scan.scope(), scan.readings()));
             uplink.frame(&scanned, readings, contacts);
+            let electrodes = touch.take_broken_wires();
+            if electrodes != 0 {
+                self.fault(Fault::BrokenWires { electrodes });
+            }
         }
     }
 

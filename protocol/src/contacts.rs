@@ -75,7 +75,9 @@ impl ContactFlags {
     pub const SATURATED: Self = Self(16);
     /// Readings of the detector at rest are not known yet, and are taken for those of a perfect detector.
     pub const RESTING: Self = Self(32);
-    const NAMED: u8 = Self::MORE.0 | Self::MISFIT.0 | Self::SATURATED.0 | Self::RESTING.0;
+    /// Wires of electrodes are broken: these are left out.
+    pub const FAULT: Self = Self(64);
+    const NAMED: u8 = Self::MORE.0 | Self::MISFIT.0 | Self::SATURATED.0 | Self::RESTING.0 | Self::FAULT.0;
 
     /// Whether all of some flags are raised.
     pub const fn has(self, flags: Self) -> bool {

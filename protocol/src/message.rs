@@ -274,6 +274,11 @@ pub enum Fault {
         /// Tag of the command.
         answers: u8,
     },
+    /// Wires of these electrodes are broken: contacts are found without them.
+    BrokenWires {
+        /// A bit each, the lowest for electrode 0.
+        electrodes: u32,
+    },
 }
 
 /// Host to board: a command, and a tag by which the answer names it.

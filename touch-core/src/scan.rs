@@ -125,8 +125,31 @@ fn row_scales(frame: &Frame<'_>, n: usize, drive_v: f32) -> PerElectrode {
     scales
 }
 
+/// Where one more contact would explain most of what contacts that are fitted leave of a frame; nowhere, if they are not determined. Counts the looks.
+pub(crate) fn beside(
+    table: &Table<'_>,
+    circuit: &Circuit,
+    (frame, errors): (&Frame<'_>, &Errors),
+    normal: &Normal,
+    work: &mut Working<'_>,
+) -> Candidates {
+    let (head, n) = (table.head(), table.electrodes());
+    let Some(factor) = Factor::of(normal, DAMPING) else { return Candidates::default() };
+    // Large: it is made where it stays, for a board's stack has no room for two.
+    let weight = 1.0 / errors.variance_v2;
+    let mut beside = Beside { table, circuit, factor, weight, rows: [Row::NONE; MAX_ELECTRODES] };
+    let mut volts = [0.0; MAX_ELECTRODES];
+    for (g, row) in beside.rows.iter_mut().enumerate().take(n) {
+        circuit.row_v(table, g, &mut volts);
+        row.take(table, (frame, errors), g, &volts);
+        row.slopes = RowSlopes::new(circuit, g, head.drive_v, head.radius_m);
+        row.sum_up(circuit, n, head.radius_m);
+    }
+    beside.candidates(work)
+}
+
 /// What is left of a frame by contacts, ready for looks at more.
-pub(crate) struct Beside<'a, 't> {
+struct Beside<'a, 't> {
     table: &'a Table<'t>,
     circuit: &'a Circuit,
     factor: Factor,
@@ -207,31 +230,8 @@ impl Row {
     }
 }
 
-impl<'a, 't> Beside<'a, 't> {
-    /// Of contacts that are fitted; `None` if they are not determined.
-    pub fn new(
-        table: &'a Table<'t>,
-        circuit: &'a Circuit,
-        frame: &Frame<'_>,
-        errors: &Errors,
-        normal: &Normal,
-    ) -> Option<Self> {
-        let (head, n) = (table.head(), table.electrodes());
-        let factor = Factor::of(normal, DAMPING)?;
-        let mut all =
-            Self { table, circuit, factor, weight: 1.0 / errors.variance_v2, rows: [Row::NONE; MAX_ELECTRODES] };
-        let mut volts = [0.0; MAX_ELECTRODES];
-        for (g, row) in all.rows.iter_mut().enumerate().take(n) {
-            circuit.row_v(table, g, &mut volts);
-            row.take(table, (frame, errors), g, &volts);
-            row.slopes = RowSlopes::new(circuit, g, head.drive_v, head.radius_m);
-            row.sum_up(circuit, n, head.radius_m);
-        }
-        Some(all)
-    }
-
-    /// Where one more contact would explain most. Counts the looks.
-    pub fn candidates(&self, errors: &Errors, work: &mut Working<'_>) -> Candidates {
+impl Beside<'_, '_> {
+    fn candidates(&self, work: &mut Working<'_>) -> Candidates {
         let (table, head) = (self.table, self.table.head());
         let mut all = Candidates::default();
         let (mut fields_ohm, mut potentials_ohm) = ([0.0; MAX_ELECTRODES], [0.0; MAX_ELECTRODES]);
@@ -251,7 +251,7 @@ impl<'a, 't> Beside<'a, 't> {
             let (along, square) = self.look(&potentials_ohm);
             if along > 0.0 && square > 0.0 {
                 let ln_ohm = held_ohm(libm::logf((square / along).max(own_ohm)), table);
-                let gain = along * along / (square * errors.variance_v2);
+                let gain = self.weight * along * along / square;
                 take(&mut all, Candidate { spot: Spot { at_m, ln_ohm, ln_radius: 0.0 }, gain }, APART * head.radius_m);
             }
         }

@@ -3,7 +3,7 @@
 use crate::circuit::MAX_CONTACTS;
 use crate::fit::{Fit, Scene, Working};
 use crate::normal::{ANY_RADIUS, PARAMETERS, USUAL_RADIUS};
-use crate::scan::{Beside, CANDIDATES, Candidates, first};
+use crate::scan::{CANDIDATES, Candidates, beside, first};
 use crate::solver::{PATIENCE, Solver, Task};
 
 /// Price of a parameter (squared deviations): that of the host's search.
@@ -162,9 +162,10 @@ impl Solver {
     /// Where one more contact would explain most of what others leave.
     fn beside(&mut self, fit: &Fit, task: Task<'_>, work: &mut Working<'_>) -> Candidates {
         let Task { table, frame, errors } = task;
-        let is_solved = self.circuit.solve(table, fit.scene.spots());
-        let beside = is_solved.then(|| Beside::new(table, &self.circuit, frame, errors, &fit.normal)).flatten();
-        beside.map_or_else(Candidates::default, |beside| beside.candidates(errors, work))
+        match self.circuit.solve(table, fit.scene.spots()) {
+            true => beside(table, &self.circuit, (frame, errors), &fit.normal, work),
+            false => Candidates::default(),
+        }
     }
 }
 

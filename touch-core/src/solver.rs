@@ -120,12 +120,15 @@ impl Solver {
             Some(fit) => has_changed || fit.normal.cost > most(fit),
         };
         self.more &= found.is_some();
-        // While something lands or lifts, its rows are not those of one scene: the next frame tells.
         let is_searched = is_lost && self.was_lost && self.may_search();
         if is_searched {
             found = self.search(found, alone, task, &mut work);
+        } else if is_lost && !self.was_lost {
+            // While something lands or lifts, rows are not those of one scene: what there was stays, and the next frame tells.
+            found = self.fit(before, ANY_RADIUS, 0, task, &mut work);
         }
-        self.was_lost = is_lost;
+        // A search that ends well has nothing to wait for.
+        self.was_lost = is_lost && !(is_searched && self.wait == 0);
         self.scene = found.map_or_else(Scene::default, |fit| fit.scene);
         self.number(&before);
         let mut answer = self.answer(found, task, work.done);

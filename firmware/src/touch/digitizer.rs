@@ -91,6 +91,10 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Touch for Digitizer<S,
         self.finder.restart();
     }
 
+    fn take_broken_wires(&mut self) -> u32 {
+        self.finder.take_broken_wires()
+    }
+
     /// As long as there is a table, and until who touches has been told to be away.
     fn needs_frames(&self) -> bool {
         self.bounds_m.is_some() || self.fingers.are_any()

@@ -25,6 +25,10 @@ pub struct ContactFinder<S, const READINGS: usize> {
     output: Output,
     solver: Solver,
     cells: Cells<READINGS>,
+    /// Electrodes whose wires the last two frames show to be broken, those of the last, and those that were told: a bit each.
+    broken_wires: u32,
+    last_broken: u32,
+    told_broken: u32,
 }
 
 impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
@@ -38,6 +42,9 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
             output: Output::Frames,
             solver: Solver::new(),
             cells: Cells::NONE,
+            broken_wires: 0,
+            last_broken: 0,
+            told_broken: 0,
         }
     }
 
@@ -122,6 +129,13 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
     fn restart(&mut self) {
         self.solver.reset();
         self.cells.restart();
+        self.told_broken = 0;
+    }
+
+    fn take_broken_wires(&mut self) -> u32 {
+        let new = self.broken_wires & !self.told_broken;
+        self.told_broken |= new;
+        new
     }
 
     fn contacts(
@@ -139,6 +153,8 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
         let table = Table::read_again(store.bytes().get(..*held)?).ok()?;
         let frame = cells.touch(&table, input, (scanned, scope, readings))?;
         let answer = solver.solve_while(&table, &frame, attend).ok()?;
+        self.broken_wires = answer.left_out & self.last_broken;
+        self.last_broken = answer.left_out;
         if cells.learn(&answer, &table) {
             // What follows is above rest.
             solver.reset();
@@ -158,6 +174,7 @@ fn told(answer: &Answer) -> Contacts {
         (Flags::MORE, ContactFlags::MORE),
         (Flags::MISFIT, ContactFlags::MISFIT),
         (Flags::SATURATED, ContactFlags::SATURATED),
+        (Flags::FAULT, ContactFlags::FAULT),
     ] {
         if answer.flags.has(found) {
             flags.raise(sent);

@@ -41,6 +41,11 @@ pub trait Touch {
         false
     }
 
+    /// Electrodes whose wires have turned out to be broken since this was asked last: a bit each.
+    fn take_broken_wires(&mut self) -> u32 {
+        0
+    }
+
     /// The contacts of a frame, if they are to be streamed. Whoever has something else to do is called by `attend` meanwhile.
     fn contacts(
         &mut self,

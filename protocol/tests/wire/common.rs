@@ -126,6 +126,7 @@ fn fault() -> impl Strategy<Value = BoardMessage> {
         any::<u8>().prop_map(|answers| Fault::BadPlan { answers }),
         any::<u8>().prop_map(|answers| Fault::BadRate { answers }),
         any::<u8>().prop_map(|answers| Fault::NoTable { answers }),
+        any::<u32>().prop_map(|electrodes| Fault::BrokenWires { electrodes }),
         any::<u8>().prop_map(Fault::UnknownVersion),
     ]
     .prop_map(BoardMessage::Fault)

@@ -62,6 +62,7 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Fault(Fault::BadRate { answers: 13 }),
         BoardMessage::Clock(Clock { answers: 7, time_us: 67_305_985 }),
         BoardMessage::Fault(Fault::NoTable { answers: 14 }),
+        BoardMessage::Fault(Fault::BrokenWires { electrodes: 1 << 5 | 1 << 12 }),
         contacts(head),
         BoardMessage::Table(TableState { answers: 15, room: 0, held: 0, usable: None }),
         BoardMessage::Table(TableState {

@@ -8,7 +8,7 @@ use std::sync::{Arc, LazyLock};
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo::detector::Detector;
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
-use tactomo::simulate::{Physics, Simulation};
+use tactomo::simulate::{self, Physics, Simulation};
 use tactomo::solve::{Problem, compile};
 use tactomo_firmware::{ContactFinder, Mux, RamStore, TimedOut, Touch};
 use tactomo_protocol::{BoardMessage, Command, Contacts, Fault, MAX_PIECE, TablePiece, TableState};
@@ -125,8 +125,17 @@ impl<T: Touch> Bench<T> {
 }
 
 pub fn simulation(contacts: &[Contact]) -> Simulation {
+    simulated(contacts, &[])
+}
+
+/// With a fault of the wires, such as `open:5`.
+pub fn faulty_simulation(contacts: &[Contact], fault: &str) -> Simulation {
+    simulated(contacts, &[fault.parse().unwrap()])
+}
+
+fn simulated(contacts: &[Contact], faults: &[simulate::Fault]) -> Simulation {
     let scene = Scene::new(SceneName::Rest, &DETECTOR, Hand::relative(&DETECTOR), 1);
-    let simulation = Simulation::new(&DETECTOR, scene, &[], 1).unwrap();
+    let simulation = Simulation::new(&DETECTOR, scene, faults, 1).unwrap();
     simulation.controls().press(contacts.to_vec());
     simulation
 }

@@ -6,7 +6,7 @@ use tactomo_protocol::{
     BoardMessage, Command, ContactFlags, Contacts, Fault, MAX_PIECE, Output, TablePiece, TableState,
 };
 
-use crate::bench::{Bench, DETECTOR, ROOM, TABLE, finder, finger, simulation, table_memory};
+use crate::bench::{Bench, DETECTOR, ROOM, TABLE, faulty_simulation, finder, finger, simulation, table_memory};
 use crate::parts::{Outside, simple_board, step};
 
 #[test]
@@ -42,6 +42,28 @@ fn a_press_in_the_first_frame_is_told_and_rest_is_learned_when_it_goes() {
     let after = bench.scan(&mut simulation(&[]), 100);
     let last = &after[99];
     assert!(last.found.is_empty() && !last.flags.has(ContactFlags::RESTING), "{last:?}");
+}
+
+#[test]
+fn a_broken_wire_is_told_once_and_contacts_are_found_without_it() {
+    let mut bench = Bench::new(finder(table_memory()));
+    bench.command(Command::Output(Output::Contacts));
+    bench.command(Command::Start);
+    bench.scan(&mut faulty_simulation(&[], "open:5"), 80);
+    bench.read(&mut faulty_simulation(&[finger([0.011, -0.007])], "open:5"));
+    step(&mut bench.board, 16 * 20);
+    let messages = bench.outside.messages();
+    let told: Vec<_> = messages.iter().filter(|message| matches!(message, BoardMessage::Fault(_))).collect();
+    assert_eq!(told, [&BoardMessage::Fault(Fault::BrokenWires { electrodes: 1 << 5 })]);
+    let last = messages.iter().rev().find_map(|message| match message {
+        BoardMessage::Contacts(contacts) => Some(contacts),
+        _ => None,
+    });
+    let Contacts { flags, found, .. } = last.unwrap();
+    let [contact] = found[..] else { panic!("{last:?}") };
+    let off_m = contact.at_m().map(f64::from);
+    assert!((off_m[0] - 0.011).hypot(off_m[1] + 0.007) < 3e-4, "{contact:?}");
+    assert!(flags.has(ContactFlags::FAULT) && !flags.has(ContactFlags::MISFIT), "{last:?}");
 }
 
 #[test]

@@ -147,9 +147,10 @@ fn measure_contacts(board: &mut VirtBoard, gauge: &Gauge) -> ! {
     };
     frames(u64::from(PRESSED_FROM) - 1);
     let at_rest = frames(1);
-    let (search, following) = (frames(1), frames(FOLLOWED_FRAMES));
+    let (landing, search, following) = (frames(1), frames(1), frames(FOLLOWED_FRAMES));
     Report(Uart::new()).line(&[
         ("instructions a frame at rest", at_rest),
+        ("instructions a frame in which something lands", landing),
         ("instructions a frame with a search", search),
         ("instructions a frame that is followed", following),
         ("stack bytes", gauge::stack_used_bytes() as u64),

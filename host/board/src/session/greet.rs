@@ -85,6 +85,10 @@ pub fn explain(fault: &Fault) -> String {
         Fault::NoTable { .. } => {
             "it has no table to find contacts by, or cannot take this one: `tactomo board table` sends one".to_owned()
         }
+        Fault::BrokenWires { electrodes } => {
+            let broken: Vec<_> = (0..u32::BITS).filter(|e| electrodes >> e & 1 == 1).map(|e| e.to_string()).collect();
+            format!("electrode {} is left out: its wire is broken", broken.join(" and electrode "))
+        }
         Fault::UnknownVersion(version) => format!("it got a command in version {version} of the protocol"),
     }
 }
