@@ -2,19 +2,11 @@
 
 use tactomo_protocol::contacts::MAX_CONTACTS;
 
-use super::{FINGER_BYTES, LAST_PLACE, REPORT_BYTES, Report, TOUCH_ID};
-
-/// A contact that has moved by no more along each axis since the last frame stands still: a hundredth of the side.
-const STILL: u16 = LAST_PLACE / 100;
-/// Frames after which it need not.
-const MOST_FRAMES: u8 = 8;
+use super::{FINGER_BYTES, REPORT_BYTES, Report, TOUCH_ID};
 
 /// What is known of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// It has been there for so many frames, and has not stood still. While something lands a frame is partly of before and partly of after, and shows it where it is
-    /// not; a fit takes some frames from there.
-    Lands(u8),
     /// It touches.
     Touches,
     /// It is no more, and the host has not heard so.
@@ -31,24 +23,6 @@ struct Finger {
     state: State,
 }
 
-impl Finger {
-    /// What is known of it after another frame, in which it is there or not.
-    fn next(self, found: Option<[u16; 2]>) -> Option<Self> {
-        let moved = found.map_or(0, |at| at[0].abs_diff(self.at[0]).max(at[1].abs_diff(self.at[1])));
-        let state = match (found, self.state) {
-            (None, State::Lands(_)) => return None,
-            (None, _) => State::Gone,
-            (Some(_), State::Lands(frames)) if moved > STILL && frames < MOST_FRAMES => State::Lands(frames + 1),
-            (Some(_), _) => State::Touches,
-        };
-        Some(Self { at: found.unwrap_or(self.at), state, ..self })
-    }
-
-    fn is_told(&self) -> bool {
-        !matches!(self.state, State::Lands(_))
-    }
-}
-
 /// Contacts that the host knows of or is to know of. One that has gone keeps its place until a report has told so, so one more waits if there are as many already.
 #[derive(Debug)]
 pub(crate) struct Fingers([Option<Finger>; MAX_CONTACTS]);
@@ -59,24 +33,23 @@ impl Fingers {
     /// Takes what touches now: numbers and places.
     pub fn follow(&mut self, touching: impl Iterator<Item = (u8, [u16; 2])> + Clone) {
         for place in &mut self.0 {
-            let found = |finger: &Finger| touching.clone().find(|(id, _)| *id == finger.id).map(|(_, at)| at);
-            *place = place.and_then(|finger| finger.next(found(&finger)));
+            let Some(finger) = place else { continue };
+            match touching.clone().find(|(id, _)| *id == finger.id) {
+                Some((_, at)) => (finger.at, finger.state) = (at, State::Touches),
+                None => finger.state = State::Gone,
+            }
         }
         for (id, at) in touching {
             let is_known = self.0.iter().flatten().any(|finger| finger.id == id);
             if !is_known && let Some(free) = self.0.iter_mut().find(|finger| finger.is_none()) {
-                *free = Some(Finger { id, at, state: State::Lands(1) });
+                *free = Some(Finger { id, at, state: State::Touches });
             }
         }
     }
 
     /// Whether there is something to tell: a screen that nothing touches is silent.
     pub fn are_any(&self) -> bool {
-        self.told().next().is_some()
-    }
-
-    fn told(&self) -> impl Iterator<Item = &Finger> {
-        self.0.iter().flatten().filter(|finger| finger.is_told())
+        self.0.iter().flatten().next().is_some()
     }
 
     /// What is to be told, of a scan at this time (us).
@@ -85,7 +58,7 @@ impl Fingers {
         report[0] = TOUCH_ID;
         let (places, _) = report[1..].as_chunks_mut::<FINGER_BYTES>();
         let mut count = 0;
-        for (place, finger) in places.iter_mut().zip(self.told()) {
+        for (place, finger) in places.iter_mut().zip(self.0.iter().flatten()) {
             let [[x0, x1], [y0, y1]] = finger.at.map(u16::to_le_bytes);
             *place = [(finger.state == State::Touches).into(), finger.id, x0, x1, y0, y1];
             count += 1;
@@ -118,48 +91,29 @@ mod tests {
     }
 
     #[test]
-    fn contacts_are_told_from_their_second_frame_on_and_once_when_they_have_gone() {
+    fn contacts_are_told_while_they_are_there_and_once_when_they_have_gone() {
         let mut fingers = Fingers::NONE;
-        follow(&mut fingers, &[5]);
-        assert!(!fingers.are_any());
         follow(&mut fingers, &[5]);
         assert_eq!(told(&fingers), [Some((1, 5)), None, None]);
         follow(&mut fingers, &[]);
         assert_eq!(told(&fingers), [Some((0, 5)), None, None]);
         fingers.forget_gone();
         assert!(!fingers.are_any());
-        // One of a single frame is none.
-        follow(&mut fingers, &[6]);
-        follow(&mut fingers, &[]);
-        assert!(!fingers.are_any());
     }
 
     #[test]
     fn one_more_waits_until_the_host_has_heard_that_another_has_gone() {
         let mut fingers = Fingers::NONE;
-        (0..2).for_each(|_| follow(&mut fingers, &[1, 2, 3]));
+        follow(&mut fingers, &[1, 2, 3]);
         fingers.forget_gone();
-        (0..3).for_each(|_| follow(&mut fingers, &[1, 3, 4]));
+        follow(&mut fingers, &[1, 3, 4]);
         assert_eq!(told(&fingers), [Some((1, 1)), Some((0, 2)), Some((1, 3))]);
         fingers.forget_gone();
-        (0..2).for_each(|_| follow(&mut fingers, &[1, 3, 4]));
+        follow(&mut fingers, &[1, 3, 4]);
         assert_eq!(told(&fingers), [Some((1, 1)), Some((1, 4)), Some((1, 3))]);
         // One that comes back before the host has heard has never been away.
         follow(&mut fingers, &[3, 4]);
         follow(&mut fingers, &[1, 3, 4]);
         assert_eq!(told(&fingers)[0], Some((1, 1)));
-    }
-
-    #[test]
-    fn contacts_that_do_not_stand_still_are_told_late() {
-        let frames = |step: u16| {
-            let (mut fingers, mut frames) = (Fingers::NONE, 0);
-            while !fingers.are_any() {
-                frames += 1;
-                fingers.follow([(1, [500, frames * step])].into_iter());
-            }
-            frames
-        };
-        assert_eq!([STILL, STILL + 1].map(frames), [2, 1 + u16::from(MOST_FRAMES)]);
     }
 }

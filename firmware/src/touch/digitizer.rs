@@ -8,7 +8,7 @@ use crate::scan::Scanned;
 
 /// A [`ContactFinder`] whose contacts go to `H` as [reports](crate::hid), as soon as it has a table and for as long.
 ///
-/// Until readings at rest are known none are sent: what they are off by might look like a touch. A contact is told from its second frame on, when it stands still. While
+/// Until readings at rest are known none are sent: what they are off by might look like a touch. While
 /// nothing touches no report is sent. The host of the line can ask for contacts, frames or both meanwhile, but for whole frames only.
 #[derive(Debug)]
 pub struct Digitizer<S, H, const READINGS: usize> {
