@@ -15,6 +15,8 @@
 //! in a field along it: Landau and Lifshitz, Electrodynamics of Continuous Media, paragraph 4, of which a layer sees one side), `2 pi R^2 s t` on a thin one (a
 //! conducting cylinder across it). Between the two of a perfect one it is taken as if squares of their reciprocals added, and of a light and a perfect one as if both
 //! were in series. The same `w` are the derivatives by a contact's place: `dZ = -(w U_k' + U_k w')`, and by its resistance `dZ = A U_k U_k'` in logarithms.
+//! Beside those the couples change: `-(a (dw w' + w dw') + da w w')`, with `dw` from second derivatives of the fields, which are large at walls, where the slope across
+//! them vanishes. What `dw` owes to other contacts is left out.
 //!
 //! A current that crowds at the rim has the fields of an even one on a wider disc. What is fitted is the radius of that disc, the spread.
 
@@ -113,10 +115,10 @@ pub(crate) struct Loaded {
     pub currents: PerElectrode,
     /// Slopes of the potential along x and y (ohm/m), likewise.
     pub slopes_ohm_per_m: [PerElectrode; 2],
-    /// Of them what drives the couples of currents (ohm/m): what walls and pads do with the contact's own current, half of the slope of its own field.
+    /// Slopes that drive the couples of currents (ohm/m): those less half of the slope of the contact's own field.
     pub driving_ohm_per_m: [PerElectrode; 2],
-    /// The moments that change with those as the place or the radius changes, in their units: for a step along x those along x and y, along y those along y (along
-    /// x they are those of the first along y), of the radius those along x and y.
+    /// The moment times the derivatives of those: of the slope along x by x, by y (or of that along y by x), of that along y by y, in usual radii; then of both by the
+    /// radius' logarithm.
     pub turned: [PerElectrode; TURNED],
 }
 
