@@ -120,20 +120,27 @@ impl Solver {
     }
 
     /// Contacts that leave too much, with each in turn looked for anew beside the others: one that went astray early is held there by those that came after it.
+    /// As often as there are contacts at most; and where there are more than can be told, it is not for the search that they leave too much.
     fn exchanged(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
-        let (mut k, mut kept) = (0, 0);
-        while kept < best.scene.count && (self.more || is_misfit(&best, task.readings())) {
+        let (mut k, mut tried) = (0, 0);
+        while tried < best.scene.count && self.is_to_be_mended(&best, task) {
             k %= best.scene.count;
+            tried += 1;
+            let before = self.more;
             let rest = self.fit(best.scene.without(k), USUAL_RADIUS, SEARCHING, task, work);
             let new = rest.and_then(|rest| self.grown(rest, task, work)).and_then(|new| self.pruned(new, task, work));
-            let before = self.more;
             let new = new.map(|new| self.completed(new, task, work));
             match new.filter(|new| score(new) < score(&best) - PARAMETER_PRICE) {
-                Some(new) => (best, kept) = (new, 0),
-                None => (k, kept, self.more) = (k + 1, kept + 1, before),
+                Some(new) => best = new,
+                None => (k, self.more) = (k + 1, before),
             }
         }
         best
+    }
+
+    fn is_to_be_mended(&self, fit: &Fit, task: Task<'_>) -> bool {
+        let is_beyond = self.more && fit.scene.count == MAX_CONTACTS;
+        !is_beyond && (self.more || is_misfit(fit, task.readings()))
     }
 
     /// Contacts without those that the others do as well without, once they are fitted anew: a second one that was found while the first was too small.
