@@ -6,8 +6,9 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-use tactomo_physics::detector::ForceLaw;
+use tactomo_physics::detector::{Detector, ForceLaw};
 use tactomo_physics::forward::{ForwardError, readings_v};
+use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 use tactomo_touch_core::Contents;
 use tactomo_touch_core::spline::{interval, weights};
@@ -289,19 +290,33 @@ fn tried_m(problem: &Problem) -> impl Iterator<Item = [f64; 2]> {
     TRIED.into_iter().map(at).filter(|place_m| outline.holds(*place_m))
 }
 
-/// What readings of contacts are off by as nobody knows the detector exactly: root mean square over readings and contacts at some places, as a share of the largest
-/// reading.
+/// What readings of contacts are off by, as nobody knows the detector and the gains and bows of its converters exactly: root mean square over readings and contacts at
+/// some places, as a share of the largest reading.
 fn detector_share(problem: &Problem) -> f64 {
-    let Some(nuisance) = problem.nuisance() else { return 0.0 };
     let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
     let squares = tried_m(problem).filter_map(|[x_m, y_m]| {
         let contacts = [Contact::flat(x_m, y_m, radius_m, detector.sheet_conductance_s())];
         let readings = readings_v(&problem.model.impedance_ohm(&contacts).ok()?, detector);
-        let patterns_v = nuisance.patterns_v(&contacts, detector).ok()?;
-        Some(patterns_v.norm_squared() / patterns_v.nrows() as f64 / readings.largest_v().powi(2))
+        let of_tolerances_v2 = match problem.nuisance() {
+            Some(nuisance) => nuisance.patterns_v(&contacts, detector).ok()?.norm_squared(),
+            None => 0.0,
+        };
+        let count = readings.volts().len() as f64;
+        Some((of_tolerances_v2 + converters_v2(detector, &readings)) / count / readings.largest_v().powi(2))
     });
     let squares: Vec<_> = squares.collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}
+
+/// Sum of the squares of what gains and bows of the converters change in readings, of one standard deviation each (V2).
+fn converters_v2(detector: &Detector, readings: &Readings) -> f64 {
+    let of_electrode = |e: usize| -> f64 {
+        let converter = detector.electrodes[e].converter;
+        let Some(converter) = detector.converters.get(converter) else { return 0.0 };
+        let changes_v = (0..readings.electrodes()).flat_map(|g| converter.changes_v(readings.at(g, e)));
+        changes_v.map(|change_v| change_v * change_v).sum()
+    };
+    (0..readings.electrodes()).map(of_electrode).sum()
 }
 
 /// How a quantity's coefficients are stored.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::solve::pipeline::method::Method;
-use tactomo_physics::detector::{Detector, ForceLaw, electrode_grid};
+use tactomo_physics::detector::{ConverterErrors, Detector, ForceLaw, electrode_grid};
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::scene::Contact as Disc;
 use tactomo_physics::simulate::{Noise, measured};
@@ -70,6 +70,9 @@ fn more_than_three_contacts_are_flagged_as_long_as_they_touch() {
         assert!(solution.contacts.len() == 3 && solution.flags.misfit, "{solution:?}");
     }
     for count in [2, 3] {
+        // The frame in which some lift is not searched.
+        let lifting = solver.solve(&touched(&five[..count], &mut noise)).unwrap();
+        assert!(lifting.flags.misfit, "{count}: {lifting:?}");
         let solution = solver.solve(&touched(&five[..count], &mut noise)).unwrap();
         assert!(solution.contacts.len() == count && !solution.flags.misfit, "{count}: {solution:?}");
     }
@@ -154,6 +157,10 @@ fn a_described_detector_is_trusted_less_than_an_exact_one() {
     };
     let [exact, described] = [model_share(&detector()), model_share(&Detector::preset("square-60").unwrap())];
     assert!(exact < 1e-3 && (0.01..0.2).contains(&described), "{exact} {described}");
+    // Gains of 1 % and bows of 12 mV, as an ESP32 has.
+    let errors = ConverterErrors { gain_share: 0.01, bow_v: 0.012, range_v: [0.142, 3.1] };
+    let on_a_chip = model_share(&Detector { converters: [errors].into(), ..detector() });
+    assert!((0.005..0.012).contains(&on_a_chip), "{on_a_chip}");
 }
 
 #[test]
