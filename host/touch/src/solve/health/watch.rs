@@ -1,9 +1,9 @@
 //! Which electrodes cannot be right, from frame to frame.
 //!
-//! One frame's verdict ([`electrodes`]) is believed after some frames in a row, so that no single frame costs an electrode, and only while no
-//! contacts explain the frames: what sound wires read needs no fault. Two pads across a narrow strip read the same while something presses at
-//! its far end, and where one of them is grounded a converter's floor hides that the other is not. An electrode that was left out comes back
-//! after many frames that would have shown its fault and do not: with readings as large as when it was found.
+//! One frame's verdict ([`electrodes`]) is believed after some frames in a row, so that no single frame costs an electrode. That wires touch is
+//! believed only while no contacts explain the frames: two pads across a narrow strip read the same while something presses at its far end, and
+//! where one of them is grounded a converter's floor hides that the other is not. An electrode that was left out comes back after many frames
+//! that would have shown its fault and do not: with readings as large as when it was found.
 
 use crate::solve::answer::{ElectrodeFault, Solution};
 use crate::solve::health::electrodes;
@@ -179,8 +179,9 @@ impl ElectrodeWatch {
         for (electrode, case) in self.cases.iter_mut().enumerate() {
             let fault = faulty.iter().find(|(wrong, _)| *wrong == electrode);
             let is_known = self.faulty.faults.iter().any(|(known, _)| *known == electrode);
-            let is_seen = fault.is_some() && !is_known && !self.is_explained;
-            case.seen = if is_seen { case.seen + 1 } else { 0 };
+            // Several contacts may explain any other fault too, but that one is no lack of evidence.
+            let is_needless = self.is_explained && fault.is_some_and(|(_, fault)| *fault == ElectrodeFault::Shorted);
+            case.seen = if fault.is_some() && !is_known && !is_needless { case.seen + 1 } else { 0 };
             found.extend(fault.filter(|_| case.seen >= CONFIRMED));
         }
         if found.is_empty() || !self.exclude(&found) {
