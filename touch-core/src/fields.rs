@@ -93,7 +93,7 @@ impl<'a> Table<'a> {
     /// Force under a contact (N), of its place and of its conductance as readings tell it, with the current that crowds under it (S); `None` where no law of
     /// force is known.
     pub fn force_n(&self, at_m: [f32; 2], apparent_conductance_s: f32) -> Option<f32> {
-        self.head.force_n(self.constricted_conductance_s(at_m, apparent_conductance_s))
+        self.head.has_law().then(|| self.head.force_n(self.constricted_conductance_s(at_m, apparent_conductance_s)))
     }
 
     /// What a law of force is of (S): the conductance as readings tell it less what of its resistance depends on the place.

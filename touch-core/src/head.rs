@@ -58,17 +58,18 @@ pub const EVEN_SPREADING: f64 = 8.0 / (3.0 * PI * PI);
 pub(crate) const NUMBERS: usize = 22;
 
 impl Head {
-    /// Force under a contact (N) of a conductance with the constriction (S); `None` where no law is known.
-    /// `S = a F^g / (1 + a F^g R)`, solved for `F`.
-    pub(crate) fn force_n(&self, conductance_s: f32) -> Option<f32> {
-        if self.force_s == 0.0 {
-            return None;
-        }
+    /// Whether a law of force is known.
+    pub(crate) fn has_law(&self) -> bool {
+        self.force_s > 0.0
+    }
+
+    /// Force under a contact (N) of a conductance with the constriction (S) by the law: `S = a F^g / (1 + a F^g R)`, solved for `F`.
+    pub(crate) fn force_n(&self, conductance_s: f32) -> f32 {
         let most_s = self.force_s * libm::powf(self.force_most_n, self.force_exponent);
         let held_s = conductance_s.max(0.0).min(most_s / (1.0 + most_s * self.force_ohm));
         let own_s = held_s / (1.0 - held_s * self.force_ohm);
         // Rounding may take the last of it beyond.
-        Some(libm::powf(own_s / self.force_s, 1.0 / self.force_exponent).min(self.force_most_n))
+        libm::powf(own_s / self.force_s, 1.0 / self.force_exponent).min(self.force_most_n)
     }
 
     /// Own field of a disc of even current on a deep layer (ohm).
@@ -143,7 +144,7 @@ impl Head {
     fn check(self) -> Result<Self, TableError> {
         let above = |value: f32| value > 0.0 && value.is_finite();
         let not_below = |value: f32| value >= 0.0 && value.is_finite();
-        let has_law = above(self.force_exponent) && not_below(self.force_ohm) && above(self.force_most_n);
+        let is_law = above(self.force_exponent) && not_below(self.force_ohm) && above(self.force_most_n);
         let all = [
             ("place", self.left_m.is_finite() && self.bottom_m.is_finite()),
             ("step of the grid", above(self.step_x_m) && above(self.step_y_m)),
@@ -159,7 +160,7 @@ impl Head {
             ("sheet conductance", above(self.sheet_s)),
             ("conductivity", above(self.top_s_per_m)),
             ("constriction", above(self.constriction_ohm)),
-            ("law of force", not_below(self.force_s) && (self.force_s == 0.0 || has_law)),
+            ("law of force", not_below(self.force_s) && (!self.has_law() || is_law)),
         ];
         match all.iter().find(|(_, sound)| !sound) {
             Some((what, _)) => Err(TableError::Number { what }),

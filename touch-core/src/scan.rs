@@ -8,6 +8,7 @@ use crate::circuit::{Circuit, MAX_CONTACTS, PerElectrode, Spot};
 use crate::fit::{Working, held_ohm};
 use crate::frame::{Errors, Frame, left_v};
 use crate::normal::{Factor, MOST, Normal, Pattern, RowSlopes};
+use crate::solver::Task;
 use crate::table::{MAX_ELECTRODES, Table};
 
 /// About so many places are looked at.
@@ -66,7 +67,7 @@ fn places(table: &Table<'_>) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Where one contact would explain most of a frame, where there is none yet. Counts the looks.
-pub(crate) fn first(table: &Table<'_>, frame: &Frame<'_>, errors: &Errors, work: &mut Working<'_>) -> Candidates {
+pub(crate) fn first(Task { table, frame, errors }: Task<'_>, work: &mut Working<'_>) -> Candidates {
     let (head, n) = (table.head(), table.electrodes());
     let scales = row_scales(frame, n, head.drive_v);
     // Scalar products with `u_e - u_g` for each electrode, and with the rest of the patterns.
@@ -127,9 +128,8 @@ fn row_scales(frame: &Frame<'_>, n: usize, drive_v: f32) -> PerElectrode {
 
 /// Where one more contact would explain most of what contacts that are fitted leave of a frame; nowhere, if they are not determined. Counts the looks.
 pub(crate) fn beside(
-    table: &Table<'_>,
+    Task { table, frame, errors }: Task<'_>,
     circuit: &Circuit,
-    (frame, errors): (&Frame<'_>, &Errors),
     normal: &Normal,
     work: &mut Working<'_>,
 ) -> Candidates {

@@ -23,11 +23,11 @@ const TRYING: usize = 8;
 const SEARCHING: usize = 20;
 
 impl Solver {
-    /// What explains a frame best, from what was followed, or from where one contact would explain most of it alone; notes how well.
+    /// What explains a frame best, from what was followed, or from where one contact would explain most of it alone, if that is known; notes how well.
     pub(crate) fn search(
         &mut self,
         from: Option<Fit>,
-        alone: Candidates,
+        alone: Option<Candidates>,
         task: Task<'_>,
         work: &mut Working<'_>,
     ) -> Option<Fit> {
@@ -49,7 +49,7 @@ impl Solver {
     fn explanation(
         &mut self,
         from: Option<Fit>,
-        mut alone: Candidates,
+        alone: Option<Candidates>,
         task: Task<'_>,
         work: &mut Working<'_>,
     ) -> Option<Fit> {
@@ -58,9 +58,7 @@ impl Solver {
         if !self.more && best.is_some_and(|best| !is_misfit(&best, task.readings())) {
             return best;
         }
-        if from.is_some() {
-            alone = first(task.table, task.frame, task.errors, work);
-        }
+        let alone = alone.unwrap_or_else(|| first(task, work));
         if alone[0].gain < FIRST_GAIN {
             return best;
         }
@@ -147,7 +145,8 @@ impl Solver {
     fn reduced(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
         while best.scene.count > 1 {
             let mut fewer = None;
-            for k in (0..best.scene.count).filter(|k| information(&best, *k) < SURE) {
+            let all = information(&best);
+            for k in (0..best.scene.count).filter(|k| all[*k] < SURE) {
                 fewer = better(fewer, self.fit(best.scene.without(k), ANY_RADIUS, SEARCHING, task, work));
             }
             match fewer.filter(|fewer| score(fewer) < score(&best)) {
@@ -168,9 +167,8 @@ impl Solver {
 
     /// Where one more contact would explain most of what others leave.
     fn beside(&mut self, fit: &Fit, task: Task<'_>, work: &mut Working<'_>) -> Candidates {
-        let Task { table, frame, errors } = task;
-        match self.circuit.solve(table, fit.scene.spots()) {
-            true => beside(table, &self.circuit, (frame, errors), &fit.normal, work),
+        match self.circuit.solve(task.table, fit.scene.spots()) {
+            true => beside(task, &self.circuit, &fit.normal, work),
             false => Candidates::default(),
         }
     }
@@ -204,13 +202,18 @@ fn better(a: Option<Fit>, b: Option<Fit>) -> Option<Fit> {
 
 /// The contact that the readings speak least for, if that is less than its price.
 fn weakest(fit: &Fit) -> Option<usize> {
-    let least = (0..fit.scene.count).min_by(|a, b| information(fit, *a).total_cmp(&information(fit, *b)))?;
-    (information(fit, least) < PAID * PARAMETER_PRICE).then_some(least)
+    let all = information(fit);
+    let least = (0..fit.scene.count).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
+    (all[least] < PAID * PARAMETER_PRICE).then_some(least)
 }
-/// What the readings say for a contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that of
-/// the derivative by its logarithm, or what others leave of that.
-fn information(fit: &Fit, k: usize) -> f32 {
-    let strength = PARAMETERS * k + 2;
-    let left = fit.normal.covariance().map_or(f32::INFINITY, |all| 1.0 / all[strength][strength]);
-    fit.normal.matrix[strength][strength].min(left)
+
+/// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that
+/// of the derivative by its logarithm, or what others leave of that.
+fn information(fit: &Fit) -> [f32; MAX_CONTACTS] {
+    let covariance = fit.normal.covariance();
+    core::array::from_fn(|k| {
+        let strength = PARAMETERS * k + 2;
+        let left = covariance.as_ref().map_or(f32::INFINITY, |all| 1.0 / all[strength][strength]);
+        fit.normal.matrix[strength][strength].min(left)
+    })
 }

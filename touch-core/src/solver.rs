@@ -9,7 +9,7 @@ use crate::circuit::{Circuit, MAX_CONTACTS};
 use crate::fit::{Fit, Fitter, Scene, Work, Working};
 use crate::frame::{Errors, Frame, FrameError, Says};
 use crate::normal::{ANY_RADIUS, MOST, PARAMETERS, Vector};
-use crate::scan::{Candidates, first};
+use crate::scan::first;
 use crate::search::{FIRST_GAIN, freedom, is_misfit, limit};
 use crate::table::Table;
 
@@ -114,10 +114,10 @@ impl Solver {
             self.wait = 0;
         }
         let most = |fit: &Fit| (WORSE * self.searched).max(limit(readings - freedom(fit)));
-        let alone = if found.is_none() { first(table, frame, task.errors, &mut work) } else { Candidates::default() };
-        let is_lost = match &found {
-            None => alone[0].gain >= FIRST_GAIN,
-            Some(fit) => has_changed || fit.normal.cost > most(fit),
+        let alone = found.is_none().then(|| first(task, &mut work));
+        let is_lost = match (&found, &alone) {
+            (Some(fit), _) => has_changed || fit.normal.cost > most(fit),
+            (None, alone) => alone.is_some_and(|alone| alone[0].gain >= FIRST_GAIN),
         };
         self.more &= found.is_some();
         let is_searched = is_lost && self.was_lost && self.may_search();

@@ -35,10 +35,7 @@ impl Scale {
                 Some(corrector) => corrector.conductance_s([contact.x_m, contact.y_m], found),
                 None => found,
             };
-            let newtons = self.law.force_n(conductance_s, deviation_s);
-            contact.force_n = Some(newtons.force_n);
-            contact.force_deviation_n = Some(newtons.deviation_n);
-            contact.force_beyond_maximum = Some(newtons.beyond_maximum);
+            contact.set_force(self.law.force_n(conductance_s, deviation_s));
         }
         solution
     }

@@ -9,6 +9,7 @@ mod total;
 pub use self::fault::ElectrodeFault;
 pub use self::shape::{FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty};
 pub use self::total::Total;
+use tactomo_physics::detector::Newtons;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::space::Place;
 
@@ -164,6 +165,13 @@ pub struct Uncertainty {
 }
 
 impl FoundContact {
+    /// Takes its force.
+    pub(crate) fn set_force(&mut self, newtons: Newtons) {
+        self.force_n = Some(newtons.force_n);
+        self.force_deviation_n = Some(newtons.deviation_n);
+        self.force_beyond_maximum = Some(newtons.beyond_maximum);
+    }
+
     /// A contact on a flat detector.
     pub fn flat(x_m: f64, y_m: f64, conductance_s: f64) -> Self {
         Self { x_m, y_m, conductance_s, ..Self::default() }

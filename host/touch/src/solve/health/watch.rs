@@ -179,7 +179,7 @@ impl ElectrodeWatch {
         for (electrode, case) in self.cases.iter_mut().enumerate() {
             let fault = faulty.iter().find(|(wrong, _)| *wrong == electrode);
             let is_known = self.faulty.faults.iter().any(|(known, _)| *known == electrode);
-            // Several contacts may explain any other fault too, but that one is no lack of evidence.
+            // Other faults show by what no sound wires read, though several contacts may seem to explain it.
             let is_needless = self.is_explained && fault.is_some_and(|(_, fault)| *fault == ElectrodeFault::Shorted);
             case.seen = if fault.is_some() && !is_known && !is_needless { case.seen + 1 } else { 0 };
             found.extend(fault.filter(|_| case.seen >= CONFIRMED));

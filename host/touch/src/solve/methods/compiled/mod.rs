@@ -83,10 +83,7 @@ pub fn add_newtons(table: &[u8], law: &ForceLaw, contacts: &mut [FoundContact]) 
     for contact in contacts {
         let at_m = [contact.x_m, contact.y_m].map(|m| m as f32);
         let apparent_s = contact.apparent_conductance_s.unwrap_or(contact.conductance_s) as f32;
-        let newtons = law.force_n(table.constricted_conductance_s(at_m, apparent_s).into(), 0.0);
-        contact.force_n = Some(newtons.force_n);
-        contact.force_deviation_n = Some(newtons.deviation_n);
-        contact.force_beyond_maximum = Some(newtons.beyond_maximum);
+        contact.set_force(law.force_n(table.constricted_conductance_s(at_m, apparent_s).into(), 0.0));
     }
 }
 

@@ -241,7 +241,8 @@ fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
 
 fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
     let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
-    let constriction_ohm = constriction_ohm(problem);
+    // Without one, or where nothing is left of it, there is no scale for forces.
+    let constriction_ohm = constriction_ohm(problem).filter(|ohm| *ohm > 0.0);
     let law = detector.force.as_ref().filter(|_| constriction_ohm.is_some());
     let of_law = |value: fn(&ForceLaw) -> f64| law.map_or(0.0, value) as f32;
     Head {
