@@ -43,13 +43,16 @@ impl Flags {
     pub const SATURATED: Self = Self(4);
     /// Wires of electrodes are broken; these are left out.
     pub const FAULT: Self = Self(8);
+    /// The contacts leave more than noise does, in what the table takes for an error of the detector: contacts may be hidden in it, and of a calibrated detector more
+    /// would be known.
+    pub const CALIBRATE: Self = Self(16);
 
     /// Whether all of some flags are raised.
     pub const fn has(self, flags: Self) -> bool {
         self.0 & flags.0 == flags.0
     }
 
-    /// As bits: 1 more, 2 misfit, 4 saturated, 8 fault.
+    /// As bits: 1 more, 2 misfit, 4 saturated, 8 fault, 16 calibrate.
     pub const fn bits(self) -> u8 {
         self.0
     }

@@ -79,6 +79,8 @@ pub(crate) fn held_ohm(ln_ohm: f32, table: &Table<'_>) -> f32 {
 pub(crate) struct Fit {
     pub scene: Scene,
     pub normal: Normal,
+    /// Whether it is known that one more contact beside these would not be worth its price.
+    pub is_alone: bool,
 }
 
 /// Work under way.
@@ -148,7 +150,7 @@ impl Fitter<'_, '_, '_> {
 
     /// Steps from a scene to where it fits best, so many at most; `None` if it makes no sense.
     pub fn fit(&mut self, scene: Scene, steps: usize) -> Option<Fit> {
-        let mut at = Fit { scene, normal: Normal::EMPTY };
+        let mut at = Fit { scene, normal: Normal::EMPTY, is_alone: false };
         if !self.look(&scene, &mut at.normal) {
             return None;
         }

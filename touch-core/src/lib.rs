@@ -7,7 +7,7 @@
 //! - [`spline`]: what its fields are interpolated with
 //! - `circuit`: readings of a few contacts, and their derivatives
 //! - `normal`, `fit`: least squares
-//! - `scan`: where contacts may be
+//! - `scan`, `beside`: where a first contact may be, and one more
 //! - [`Solver`]: contacts from frame to frame
 
 #![no_std]
@@ -21,6 +21,7 @@
 extern crate std;
 
 mod answer;
+mod beside;
 mod circuit;
 mod contents;
 mod crc;

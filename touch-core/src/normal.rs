@@ -162,8 +162,8 @@ impl Pattern {
         self.turned.iter_mut().zip(other.turned).for_each(|(sum, turned)| *sum += share * turned);
     }
 
-    /// Derivatives of the impedance between two electrodes by the parameters (ohm).
-    fn changes_ohm(&self, other: &Self, one: &Loaded) -> [f32; PARAMETERS] {
+    /// Derivatives of the impedance between two electrodes by the parameters (ohm): linear in each of both.
+    pub fn changes_ohm(&self, other: &Self, one: &Loaded) -> [f32; PARAMETERS] {
         let both = |a: f32, of_a: f32, b: f32, of_b: f32| a * of_b + b * of_a;
         let moved = |p: usize| both(self.along[p], self.current, other.along[p], other.current);
         let turned = |t: usize, d: usize| both(self.turned[t], self.driving[d], other.turned[t], other.driving[d]);
@@ -184,11 +184,11 @@ impl Pattern {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowSlopes {
     /// Volts by ohm.
-    per_ohm: f32,
+    pub per_ohm: f32,
     /// Of each contact at the grounded electrode.
-    own: [Pattern; MAX_CONTACTS],
+    pub own: [Pattern; MAX_CONTACTS],
     /// Change of the load by each parameter (ohm).
-    own_ohm: Vector,
+    pub own_ohm: Vector,
 }
 
 impl RowSlopes {
@@ -205,9 +205,8 @@ impl RowSlopes {
         all
     }
 
-    /// Adds the derivatives of a reading, or of a sum of readings, by the parameters of a contact: of those of which `pattern` is the contact's, and `of_load` what of
-    /// the drive is not predicted at them.
-    pub fn add(&self, circuit: &Circuit, k: usize, pattern: &Pattern, of_load: f32, slope: &mut Vector) {
+    /// Adds the derivatives of a reading by the parameters of a contact, of which the electrode has `pattern`; `of_load` is what of the drive is not predicted at it.
+    fn add(&self, circuit: &Circuit, k: usize, pattern: &Pattern, of_load: f32, slope: &mut Vector) {
         let first = PARAMETERS * k;
         let changes_ohm = pattern.changes_ohm(&self.own[k], &circuit.loaded[k]);
         for (i, change_ohm) in changes_ohm.into_iter().enumerate() {

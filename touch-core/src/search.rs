@@ -1,9 +1,10 @@
 //! The search for what explains a frame.
 
+use crate::beside::beside;
 use crate::circuit::MAX_CONTACTS;
 use crate::fit::{Fit, Scene, Working};
 use crate::normal::{ANY_RADIUS, PARAMETERS, USUAL_RADIUS};
-use crate::scan::{CANDIDATES, Candidates, beside, first};
+use crate::scan::{CANDIDATES, Candidates, first};
 use crate::solver::{PATIENCE, Solver, Task};
 
 /// Price of a parameter (squared deviations): that of the host's search.
@@ -94,6 +95,10 @@ impl Solver {
                 return best;
             }
             let candidates = self.beside(&at, task, work);
+            if candidates[0].gain <= PAID * PARAMETER_PRICE {
+                // With any radii they leave still less.
+                return best.map(|best| Fit { is_alone: best.scene.count == at.scene.count, ..best });
+            }
             let starts = candidates.map(|one| (one.gain > PAID * PARAMETER_PRICE).then(|| at.scene.with(one.spot)));
             let Some(more) = self.best_of(&starts, USUAL_RADIUS, task, work) else { return best };
             at = more;
@@ -103,7 +108,7 @@ impl Solver {
     /// Contacts with those that are looked for beside them as long as one would explain much of what they leave; notes whether another one would.
     fn completed(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
         loop {
-            let candidates = self.beside(&best, task, work);
+            let candidates = if best.is_alone { Candidates::default() } else { self.beside(&best, task, work) };
             self.more = candidates[0].gain > FIRST_GAIN;
             if !self.more || best.scene.count == MAX_CONTACTS {
                 return best;

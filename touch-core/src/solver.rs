@@ -22,6 +22,9 @@ const SATURATED_SHEETS: f32 = 100.0;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
 pub(crate) const PATIENCE: [u32; 2] = [1, 64];
 
+/// Standard errors have to be above this times those by noise alone for a calibration to be worth it: the host's.
+const CALIBRATION_WORTH: f32 = 2.0;
+
 /// A frame to be explained.
 #[derive(Clone, Copy)]
 pub(crate) struct Task<'a> {
@@ -200,6 +203,7 @@ impl Solver {
             return answer;
         };
         answer.flags.raise(Flags::MISFIT, is_misfit(&fit, readings));
+        answer.flags.raise(Flags::CALIBRATE, is_to_be_calibrated(&fit, task));
         answer.residual = libm::sqrtf(fit.normal.cost / readings.max(1.0));
         let covariance = fit.normal.covariance();
         let firmest_s = SATURATED_SHEETS * table.head().sheet_s;
@@ -233,4 +237,12 @@ impl Solver {
             correlation: if x * y > 0.0 { of(0, 1) / (x * y) } else { 0.0 },
         }
     }
+}
+
+/// Whether a fit leaves more than noise does, and the table takes that for an error of the detector.
+fn is_to_be_calibrated(fit: &Fit, Task { table, errors, .. }: Task<'_>) -> bool {
+    let noise_v = table.head().noise_v;
+    let of_noise = errors.variance_v2 / (noise_v * noise_v);
+    let is_worth_it = of_noise > CALIBRATION_WORTH * CALIBRATION_WORTH;
+    is_worth_it && of_noise * fit.normal.cost > limit(errors.count as f32 - freedom(fit))
 }
