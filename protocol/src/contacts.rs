@@ -62,7 +62,7 @@ pub struct Contacts {
     pub found: Vec<ContactCode, MAX_CONTACTS>,
 }
 
-/// What to know before contacts are believed. Bits without a name are sent as zero, and a receiver drops them.
+/// What to know before contacts are believed: all bits beside the count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ContactFlags(u8);
 
@@ -77,7 +77,8 @@ impl ContactFlags {
     pub const RESTING: Self = Self(32);
     /// Wires of electrodes are broken: these are left out.
     pub const FAULT: Self = Self(64);
-    const NAMED: u8 = Self::MORE.0 | Self::MISFIT.0 | Self::SATURATED.0 | Self::RESTING.0 | Self::FAULT.0;
+    /// The contacts leave more than noise does, which the table takes for an error of the detector: contacts may be hidden in it until that is calibrated.
+    pub const CALIBRATE: Self = Self(128);
 
     /// Whether all of some flags are raised.
     pub const fn has(self, flags: Self) -> bool {
@@ -181,7 +182,7 @@ impl Contacts {
     pub(crate) fn write(&self, body: &mut [u8]) {
         let (head, contacts) = body.split_at_mut(HEAD_BYTES);
         head.copy_from_slice(&self.head.to_bytes(0));
-        head[HEAD_BYTES - 1] = self.flags.0 & ContactFlags::NAMED | self.found.len() as u8;
+        head[HEAD_BYTES - 1] = self.flags.0 & !COUNT | self.found.len() as u8;
         let places = contacts.as_chunks_mut().0;
         places.iter_mut().zip(&self.found).for_each(|(place, contact)| *place = contact.to_bytes());
     }
@@ -197,7 +198,7 @@ impl Contacts {
         let (head, _) = FrameHead::from_bytes(*head);
         Some(Self {
             head: FrameHead { fraction_bits: 0, ..head },
-            flags: ContactFlags(last & ContactFlags::NAMED),
+            flags: ContactFlags(last & !COUNT),
             found: contacts.iter().map(|bytes| ContactCode::from_bytes(*bytes)).collect(),
         })
     }

@@ -110,7 +110,7 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
 
     fn set_output(&mut self, output: Output) -> bool {
         let can = self.usable.is_some() || !output.has_contacts();
-        if can && output != self.output {
+        if can {
             self.output = output;
             self.restart();
         }
@@ -175,6 +175,7 @@ fn told(answer: &Answer) -> Contacts {
         (Flags::MISFIT, ContactFlags::MISFIT),
         (Flags::SATURATED, ContactFlags::SATURATED),
         (Flags::FAULT, ContactFlags::FAULT),
+        (Flags::CALIBRATE, ContactFlags::CALIBRATE),
     ] {
         if answer.flags.has(found) {
             flags.raise(sent);

@@ -13,12 +13,14 @@ use tactomo::schema::FrameReport;
 use tactomo::sink::lines::Fields;
 use tactomo::sink::mcap::McapFile;
 use tactomo::sink::mcap::ros2::{self, Ros2File};
+use tactomo::sink::place::Place;
 use tactomo::solve::{Lambda, Method};
 
 use self::answers::{Answer, Answers, Recording};
+use super::live::skin::{self, Patch};
 use super::reconstruct::reader::Input;
 use super::reconstruct::writer::{FileForm, Writer};
-use super::recording::folder;
+use super::recording::folder::{self, SKIN};
 use super::streams::Streamed;
 use tactomo_cli::choice::{self, DetectorArgs, Model};
 use tactomo_cli::interrupt;
@@ -132,8 +134,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let stop = interrupt::flag()?;
     let files = args.checked()?;
     let out = args.out_beside(&files)?;
-    let open = |(name, file)| Recording::open(name, &args.input(file), args.pointer);
-    let recordings = files.iter().map(|(name, file)| open((name, file))).collect::<anyhow::Result<Vec<_>>>()?;
+    let places = args.places()?;
+    let open = |(name, file): &(String, PathBuf)| {
+        let place = places.iter().find(|(patch, _)| patch == name).map(|(_, place)| *place);
+        Recording::open(name, place, &args.input(file), args.pointer)
+    };
+    let recordings = files.iter().map(open).collect::<anyhow::Result<Vec<_>>>()?;
     let mut out = Out::begin((args.to, args.profile.unwrap_or_default()), out, &recordings)?;
     let fields = args.fields.unwrap_or_default();
     let mut answers = Answers::new(recordings);
@@ -181,6 +187,16 @@ impl Args {
         Ok(files)
     }
 
+    /// Where the detectors of a folder lie on a body, by name, as far as its skin's file tells.
+    fn places(&self) -> anyhow::Result<Vec<(String, Place)>> {
+        let path = self.file.join(SKIN);
+        if !path.is_file() {
+            return Ok(Vec::new());
+        }
+        let placed = |Patch { name, place, .. }| Some((name, place?));
+        Ok(skin::read(&path)?.into_iter().filter_map(placed).collect())
+    }
+
     /// The file to write, which is none of those that are read.
     fn out_beside(&self, files: &[(String, PathBuf)]) -> anyhow::Result<NewFile> {
         let beside = |(_, file): &(String, PathBuf)| NewFile::beside(file, &self.out, self.overwrite);
@@ -200,6 +216,7 @@ impl Args {
             unit: None,
             force: None,
             uncorrected: false,
+            keeps_found: true,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! `tactomo live`: the live picture.
 
 mod several;
-mod skin;
+pub mod skin;
 mod together;
 
 use std::path::PathBuf;

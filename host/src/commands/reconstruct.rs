@@ -1,5 +1,7 @@
 //! `tactomo reconstruct`: touch from readings in a file.
 
+mod by_board;
+mod opened;
 pub mod reader;
 pub mod units;
 pub mod writer;
@@ -91,6 +93,7 @@ impl Args {
             unit: self.unit,
             force: None,
             uncorrected: false,
+            keeps_found: true,
         }
     }
 }

@@ -1,8 +1,9 @@
 //! What a board has found by itself, as solvers of this program tell it.
 
+use tactomo_board::frames::FoundByBoard;
 use tactomo_physics::readings::Readings;
-use tactomo_protocol::{ContactCode, ContactFlags, Contacts, Status};
-use tactomo_touch::solve::{Flags, FoundContact, Solution, SolveError, Solver, Uncertainty};
+use tactomo_protocol::{ContactCode, ContactFlags, MAX_ELECTRODES, Status};
+use tactomo_touch::solve::{ElectrodeFault, Flags, FoundContact, Solution, SolveError, Solver, Uncertainty};
 
 use super::inbox::Found;
 
@@ -22,20 +23,30 @@ impl Solver for OnBoard {
 }
 
 /// The contacts of a packet, whose readings came too or did not.
-pub(super) fn found(contacts: &Contacts, has_readings: bool) -> Found {
+pub(super) fn found(by_board: &FoundByBoard, has_readings: bool) -> Found {
+    let is_taking_rest = by_board.contacts.flags.has(ContactFlags::RESTING);
+    Found { solution: solution(by_board), is_taking_rest, has_readings }
+}
+
+/// What a board has found, as a solution, without newtons.
+pub fn solution(FoundByBoard { contacts, broken_wires }: &FoundByBoard) -> Solution {
     let flags = contacts.flags;
-    let solution = Solution {
+    let is_left_out = |e: &usize| flags.has(ContactFlags::FAULT) && broken_wires >> e & 1 == 1;
+    let excluded: Vec<_> = (0..MAX_ELECTRODES).filter(is_left_out).collect();
+    Solution {
         contacts: contacts.found.iter().map(contact).collect(),
         flags: Flags {
             saturated: flags.has(ContactFlags::SATURATED),
             misfit: flags.has(ContactFlags::MISFIT)
                 || flags.has(ContactFlags::MORE)
                 || contacts.head.status.contains(Status::TIMED_OUT),
+            calibrate: flags.has(ContactFlags::CALIBRATE),
+            faults: vec![ElectrodeFault::Open; excluded.len()],
+            excluded,
             ..Flags::default()
         },
         ..Solution::default()
-    };
-    Found { solution, is_taking_rest: flags.has(ContactFlags::RESTING), has_readings }
+    }
 }
 
 /// A contact. The board tells the conductance that readings determine, and the larger standard error of the place.

@@ -40,6 +40,7 @@ pub mod table;
 mod wires;
 
 pub use self::event::{Listener, TouchEvent};
+pub use self::found::solution as solution_of_board;
 pub use self::frame::{Arrival, Frame, NewestReadings};
 pub use self::maker::SolverState;
 pub use self::order::Order;

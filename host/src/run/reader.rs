@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+use tactomo_board::frames::FoundByBoard;
 use tactomo_board::identity;
 use tactomo_board::link::{Control, Link, Playing};
 use tactomo_board::measured::{self, Volts};
@@ -18,7 +19,7 @@ use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::SceneName;
-use tactomo_protocol::{BoardMessage, Contacts, DecodeError, Hello, Output};
+use tactomo_protocol::{BoardMessage, Contacts, DecodeError, Fault, Hello, Output};
 
 use super::connection::Connection;
 use super::course::Course;
@@ -78,6 +79,7 @@ pub fn run(source: &mut dyn Source, mut options: RunOptions, ends: Ends) -> Resu
         newest: None,
         plans: PlanRequests::new(requested),
         found: None,
+        broken_wires: 0,
     };
     let ended = reader.run(source);
     inbox.close();
@@ -136,6 +138,8 @@ struct Reader {
     plans: PlanRequests,
     /// Contacts whose readings are still to come.
     found: Option<Contacts>,
+    /// Electrodes of which the board has said that their wires are broken: a bit each.
+    broken_wires: u32,
 }
 
 /// Who has said Hello, and what its frames mean.
@@ -164,6 +168,9 @@ impl Reader {
                 Ok(BoardMessage::Clock(clock)) => connection.session.clock(clock, received),
                 Ok(BoardMessage::Log(log)) => self.options.board_log.take(&log.0),
                 Ok(BoardMessage::Fault(fault)) => {
+                    if let Fault::BrokenWires { electrodes } = fault {
+                        self.broken_wires |= electrodes;
+                    }
                     // What answers a command is told where that is given up.
                     if !connection.session.fault(&fault) {
                         tracing::warn!("the board says: {}", session::explain(&fault));
@@ -214,6 +221,9 @@ impl Reader {
             let other_board = identity::other_board(calibrated.as_deref().unwrap_or(&measured), &hello);
             // Settings change its Hello, and not what it is.
             let is_new = known.is_none_or(|board| identity::identity(&board.hello) != identity::identity(&hello));
+            if is_new {
+                self.broken_wires = 0;
+            }
             if let Some(notice) = other_board.as_ref().filter(|_| is_new) {
                 tracing::warn!("{notice}");
             }
@@ -270,8 +280,9 @@ impl Reader {
 
     /// Takes contacts that the board has found; where their readings come too, these bring them along.
     fn contacts(&mut self, connection: &mut Connection, contacts: Contacts, received: Instant) {
-        if self.board.is_none() || connection.junk.is_none() {
-            return;
+        let (Some(board), Some(_)) = (&self.board, connection.junk) else { return };
+        if !connection.answers && board.detector.force.is_some() {
+            self.options.table.compile_once(&board.detector);
         }
         connection.session.contacts(received);
         connection.landed();
@@ -316,7 +327,8 @@ impl Reader {
     }
 
     fn found_on_board(&self, contacts: &Contacts, has_readings: bool) -> Found {
-        let mut found = found::found(contacts, has_readings);
+        let by_board = FoundByBoard { contacts: contacts.clone(), broken_wires: self.broken_wires };
+        let mut found = found::found(&by_board, has_readings);
         if let Some(law) = &self.options.detector.force {
             self.options.table.add_newtons(law, &mut found.solution.contacts);
         }
@@ -334,7 +346,12 @@ impl Reader {
     fn answer_requests(&mut self, mut open: Option<(&mut dyn Link, &mut Connection)>) {
         while let Ok(request) = self.requests.try_recv() {
             match request {
-                Request::Rezero => self.inbox.put(Event::Rezero),
+                Request::Rezero => {
+                    self.inbox.put(Event::Rezero);
+                    if let Some((_, connection)) = open.as_mut().filter(|_| self.options.output.has_contacts()) {
+                        connection.session.renew_output();
+                    }
+                }
                 Request::Solver(method) => self.inbox.put(Event::Method(method)),
                 Request::Settings(settings) => {
                     self.options.settings = self.options.settings.changed_by(settings);

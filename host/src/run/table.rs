@@ -1,6 +1,6 @@
 //! A board that finds contacts by itself: it is given the table of its detector before it is asked for them.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use tactomo_board::link::Link;
@@ -8,6 +8,7 @@ use tactomo_board::measured::{self, Mismatch};
 use tactomo_board::session::{self, GreetError};
 use tactomo_board::source::{Source, SourceError};
 use tactomo_board::table::{self, TableError};
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Detector, ForceLaw};
 use tactomo_physics::forward::ForwardError;
 use tactomo_protocol::{Hello, TableId};
@@ -87,17 +88,37 @@ pub enum What {
 
 /// The table that a board was given last, for those who read what it finds.
 #[derive(Clone, Debug, Default)]
-pub struct BoardTable(Arc<Mutex<Vec<u8>>>);
+pub struct BoardTable(Arc<Kept>);
+
+#[derive(Debug, Default)]
+struct Kept {
+    bytes: Mutex<Vec<u8>>,
+    /// Whether one is compiled of what was recorded.
+    is_compiled: OnceLock<()>,
+}
 
 impl BoardTable {
     fn put(&self, bytes: Vec<u8>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = bytes;
+        *self.0.bytes.lock().unwrap_or_else(PoisonError::into_inner) = bytes;
+    }
+
+    /// Compiles the table of a detector, as its board measures it, once: for newtons of contacts that were recorded. A recording waits for that second.
+    pub(super) fn compile_once(&self, detector: &Detector) {
+        self.0.is_compiled.get_or_init(|| {
+            let compiled = || Ok(compile(&Problem::of(detector)?)?);
+            match compiled() {
+                Ok(bytes) => self.put(bytes),
+                Err::<_, GiveTableError>(error) => {
+                    tracing::warn!("contacts are without newtons: {}", with_causes(&error))
+                }
+            }
+        });
     }
 
     /// Adds newtons to contacts that the board has found.
     pub(super) fn add_newtons(&self, law: &ForceLaw, contacts: &mut [FoundContact]) {
-        // It was checked when it was given; there is none of what was recorded.
-        solve::add_newtons(&self.0.lock().unwrap_or_else(PoisonError::into_inner), law, contacts);
+        // It was checked when it was given.
+        solve::add_newtons(&self.0.bytes.lock().unwrap_or_else(PoisonError::into_inner), law, contacts);
     }
 }
 

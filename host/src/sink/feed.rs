@@ -69,8 +69,22 @@ struct Course {
     /// Frames lost by the link or the board until the event that was delivered last, if one was.
     lost: Option<u64>,
     changes: Changes,
-    /// When what does not change was told (ns since 1970), if it was.
-    renewed_ns: Option<u64>,
+    renewal: Renewal,
+}
+
+/// When a taker was told last what does not change, such as a place.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Renewal(Option<u64>);
+
+impl Renewal {
+    /// Whether it is to be told with an event of this time (ns since 1970): with the first, and again once a second.
+    pub fn is_due(&mut self, now_ns: u64) -> bool {
+        let is_due = self.0.is_none_or(|then_ns| now_ns.abs_diff(then_ns) >= RENEWED_EVERY_NS);
+        if is_due {
+            self.0 = Some(now_ns);
+        }
+        is_due
+    }
 }
 
 /// What a taker has lost, since it was too slow.
@@ -97,12 +111,12 @@ pub struct Delivery {
     pub pointer_events: Vec<PointerEvent>,
     /// The contacts, with what they have done since the delivery before.
     pub changed: Changed,
-    /// Whether what does not change is to be told: it is with the first, and again once a second.
+    /// Whether what does not change is to be [told](Renewal).
     pub renews: bool,
 }
 
 impl Delivery {
-    /// An event that nobody had to wait for, and before which nothing was missed; `changes` remember the one before.
+    /// An event that nobody had to wait for, before which nothing was missed, and with which all is told; `changes` remember the one before.
     pub fn at_once(event: TouchEvent, changes: &mut Changes) -> Self {
         let (lost_before, pointer_events) = (event.lost_before, event.pointer_events.clone());
         let changed = changes.take(&event.solution.contacts);
@@ -191,7 +205,8 @@ impl Tail {
 
     fn course(&mut self, patch: &Arc<str>) -> &mut Course {
         let decimator = || Decimator::new(self.most_per_s);
-        let begun = || Course { decimator: decimator(), lost: None, changes: Changes::default(), renewed_ns: None };
+        let begun =
+            || Course { decimator: decimator(), lost: None, changes: Changes::default(), renewal: Renewal::default() };
         self.patches.entry(Arc::clone(patch)).or_insert_with(begun)
     }
 
@@ -241,11 +256,7 @@ impl Tail {
         let before = course.lost.replace(lost).unwrap_or(lost.saturating_sub(event.lost_before));
         let lost_before = lost.saturating_sub(before);
         let changed = course.changes.take(&event.solution.contacts);
-        let now_ns = event.frame.arrived.unix_ns;
-        let renews = course.renewed_ns.is_none_or(|then_ns| now_ns.abs_diff(then_ns) >= RENEWED_EVERY_NS);
-        if renews {
-            course.renewed_ns = Some(now_ns);
-        }
+        let renews = course.renewal.is_due(event.frame.arrived.unix_ns);
         let missed_before = std::mem::take(&mut self.losses.before);
         Delivery { patch, event, lost_before, missed_before, pointer_events, changed, renews }
     }

@@ -18,5 +18,5 @@ mod tcp;
 mod udp;
 mod web;
 
-pub use self::feed::Delivery;
+pub use self::feed::{Delivery, Renewal};
 pub use self::running::{SinkError, Sinks};

@@ -30,7 +30,11 @@ fn a_folder_of_recordings_is_one_file_with_the_topics_that_live_writes() {
     let folder = Folder::new("streams-folder");
     let [taken, live, all, ros, lines] =
         ["taken", "live.mcap", "all.mcap", "ros2.mcap", "all.jsonl"].map(|name| folder.path(name));
-    let boards = ["live", "--simulate", "2", "--scene", "single", "--seconds", "2", "--json"];
+    let skin = folder.path("skin.toml");
+    let patch = |name: &str| format!("[[patch]]\nname = \"{name}\"\nsimulate = true\nscene = \"single\"\n");
+    let place = "place = { xyz_m = [0.1, 0.0, 0.0], rpy_rad = [0.0, 0.0, 0.0] }\n";
+    std::fs::write(&skin, patch("board-1") + place + &patch("board-2")).unwrap();
+    let boards = ["live", "--skin", &skin, "--seconds", "2", "--json"];
     TACTOMO.succeeds(&[&boards[..], &["--record", &taken, "--mcap", &live]].concat());
     let export = ["export", &taken, "--solver", "contacts", "--to"];
     TACTOMO.succeeds(&[&export[..], &["mcap", "--out", &all]].concat());
@@ -52,7 +56,10 @@ fn a_folder_of_recordings_is_one_file_with_the_topics_that_live_writes() {
     let [mut of_live, of_all] = [&of_live, &of_all].map(|messages| by_topic(&messages[..messages.len() - 1], 4));
     // The solver that live has may answer by an image now and then.
     of_live.retain(|topic, _| !topic.ends_with("/image"));
-    assert!(of_all.keys().eq(of_live.keys()) && of_all.len() == 6, "{:?} {:?}", of_all.keys(), of_live.keys());
+    assert!(of_all.keys().eq(of_live.keys()) && of_all.len() == 7, "{:?} {:?}", of_all.keys(), of_live.keys());
+    // Of the one that has a place, once a second.
+    let places = &of_all["/tactomo/board-1/tf"];
+    assert!((1..=4).contains(&places.len()) && places[0].1["translation"]["x"] == 0.1, "{places:?}");
     for (name, count) in ["board-1", "board-2"].iter().zip(counts) {
         let topic = |what: &str| format!("/tactomo/{name}/{what}");
         let readings = &of_all[&*topic("readings")];

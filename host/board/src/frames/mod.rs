@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use tactomo_protocol::Hello;
+use tactomo_protocol::{Contacts, Hello};
 
 pub use self::recorded::{Recorded, RecordingLoss};
 pub use self::survey::Survey;
@@ -54,6 +54,17 @@ pub struct FileFrame {
     pub measured_v: Vec<f64>,
     /// What each says; empty where all are voltages.
     pub says: Vec<Says>,
+    /// What the board has found in it by itself, if it did.
+    pub found: Option<Box<FoundByBoard>>,
+}
+
+/// What a board has found in a frame by itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundByBoard {
+    /// Its contacts.
+    pub contacts: Contacts,
+    /// Electrodes whose wires it has said to be broken, by then: a bit each.
+    pub broken_wires: u32,
 }
 
 impl FileFrame {
@@ -62,6 +73,11 @@ impl FileFrame {
         let n = self.volts.len().isqrt();
         let readings = Readings::new(n, self.volts.clone())?;
         Some(if self.says.is_empty() { readings } else { readings.saying(|g, e| self.says[g * n + e]) })
+    }
+
+    /// What the board has found, of a frame whose readings it has not sent.
+    pub fn found_alone(&self) -> Option<&FoundByBoard> {
+        self.found.as_deref().filter(|_| self.says.iter().all(|says| *says == Says::Nothing) && !self.says.is_empty())
     }
 
     /// As the readings of a detector as measured; `None` if they are no square.
@@ -204,6 +220,13 @@ impl FrameFile {
         }
     }
 
+    /// Hands out frames too whose readings a board has not sent, with [what it has found](FileFrame::found_alone) in them: of these no reading says anything.
+    pub fn keep_found(&mut self) {
+        if let Self::Recording(recorded) = self {
+            recorded.keep_found();
+        }
+    }
+
     /// Numbers in each frame.
     pub fn channels(&self) -> usize {
         match self {
@@ -254,6 +277,7 @@ impl Rows {
             measured_v: volts.clone(),
             volts,
             says: Vec::new(),
+            found: None,
         })
     }
 }

@@ -6,9 +6,10 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Frame, Hello};
+use tactomo_physics::readings::Readings;
+use tactomo_protocol::{BoardMessage, BoardReceiver, Contacts, DecodeError, Fault, Frame, FrameHead, Hello};
 
-use super::{FileFrame, FramesError};
+use super::{FileFrame, FoundByBoard, FramesError};
 use crate::clock::BoardClock;
 use crate::measured::Volts;
 use crate::record::{Entry, Header, Loss, Note, OtherProtocol, RecordReader};
@@ -32,6 +33,12 @@ pub struct Recorded {
     clock: BoardClock,
     notes: Vec<(f64, Note)>,
     frames: VecDeque<FileFrame>,
+    /// Contacts whose readings have not come yet.
+    found: Option<Contacts>,
+    /// Electrodes whose wires the board has said to be broken: a bit each.
+    broken_wires: u32,
+    /// Whether frames are handed out that have nothing but what the board has found.
+    keeps_found: bool,
 }
 
 /// From board times to seconds since the first frame. Where the board begins to count anew, or another recording was joined on, times go on by
@@ -154,6 +161,9 @@ impl Recorded {
                     clock,
                     notes,
                     frames: VecDeque::new(),
+                    found: None,
+                    broken_wires: 0,
+                    keeps_found: false,
                 };
                 recorded.decode();
                 return Ok(recorded);
@@ -180,6 +190,10 @@ impl Recorded {
         }
     }
 
+    pub(super) fn keep_found(&mut self) {
+        self.keeps_found = true;
+    }
+
     /// The board, as it said who it is first.
     pub fn board(&self) -> &Hello {
         &self.board
@@ -193,10 +207,18 @@ impl Recorded {
 
     pub(super) fn next_frame(&mut self) -> Result<Option<FileFrame>, FramesError> {
         loop {
-            if let Some(frame) = self.frames.pop_front() {
-                return Ok(Some(frame));
+            let frames = std::iter::from_fn(|| self.frames.pop_front());
+            let frame = frames.into_iter().find(|frame| self.keeps_found || frame.found_alone().is_none());
+            if frame.is_some() {
+                return Ok(frame);
             }
-            let Some(entry) = read(&mut self.reader, &mut self.chunk, &self.path)? else { return Ok(None) };
+            let Some(entry) = read(&mut self.reader, &mut self.chunk, &self.path)? else {
+                match self.found.is_some() {
+                    true => self.end_found(),
+                    false => return Ok(None),
+                }
+                continue;
+            };
             match entry.note {
                 None => {
                     self.times.arrived_us = entry.time_us;
@@ -215,6 +237,8 @@ impl Recorded {
 
     /// What follows is of another recording, whose board counts anew.
     fn begin_another(&mut self) {
+        self.end_found();
+        self.broken_wires = 0;
         self.corrupt_before += self.receiver.counters().corrupt - self.junk;
         (self.receiver, self.junk) = (BoardReceiver::default(), 0);
         self.sequence.restart();
@@ -228,10 +252,12 @@ impl Recorded {
         let mut input = &chunk[..];
         while let Some(message) = self.receiver.receive(&mut input) {
             match message {
-                Ok(BoardMessage::Frame(frame)) => match self.in_volts(&frame) {
-                    Some(frame) => self.frames.push_back(frame),
-                    None => self.lost.other_frames += 1,
-                },
+                Ok(BoardMessage::Frame(frame)) => self.frame(&frame),
+                Ok(BoardMessage::Contacts(contacts)) => {
+                    self.end_found();
+                    self.found = Some(contacts);
+                }
+                Ok(BoardMessage::Fault(Fault::BrokenWires { electrodes })) => self.broken_wires |= electrodes,
                 Ok(BoardMessage::Clock(said)) => self.clock.said(said, Duration::from_micros(self.times.arrived_us)),
                 Ok(BoardMessage::Hello(Hello { answers: 0, .. })) => self.clock.restart(),
                 _ => {}
@@ -240,27 +266,46 @@ impl Recorded {
         self.chunk = chunk;
     }
 
-    /// Readings and time of a frame; `None` if it is of a board with other electrodes.
-    fn in_volts(&mut self, frame: &Frame) -> Option<FileFrame> {
-        let measured = self.volts.measured(frame)?;
-        let measured_v = measured.volts().to_vec();
-        let readings = self.volts.used(measured);
-        let place = self.sequence.place(&frame.head);
+    /// Takes a frame, with the contacts that came before it, if they are its.
+    fn frame(&mut self, frame: &Frame) {
+        let Some(measured) = self.volts.measured(frame) else {
+            self.lost.other_frames += 1;
+            return;
+        };
+        let found = self.found.take_if(|contacts| contacts.head.sequence == frame.head.sequence);
+        self.end_found();
+        let used = self.volts.used(measured.clone());
+        self.take(&frame.head, [measured, used], found);
+    }
+
+    /// Takes contacts whose readings do not come.
+    fn end_found(&mut self) {
+        if let Some(contacts) = self.found.take() {
+            let nothing = Readings::from_fn(self.board.electrodes.into(), |_, _| 0.0).hiding(|_, _| true);
+            self.take(&contacts.head.clone(), [nothing.clone(), nothing], Some(contacts));
+        }
+    }
+
+    /// Takes a frame's readings, as measured and as used, and what the board has found in it.
+    fn take(&mut self, head: &FrameHead, [measured, used]: [Readings; 2], found: Option<Contacts>) {
+        let place = self.sequence.place(head);
         if let Some((last_us, _)) = self.times.last.filter(|_| place.dropped > 0) {
             let gap_us = place.time_us.saturating_sub(last_us);
             self.lost.missing_us += gap_us / (place.dropped + 1) * place.dropped;
         }
         self.lost.missing_frames += place.dropped;
-        Some(FileFrame {
+        let broken_wires = self.broken_wires;
+        self.frames.push_back(FileFrame {
             time_s: Some(self.times.place(place.time_us)),
             arrived_s: Some(self.times.arrived_us as f64 * 1e-6),
-            delay: self.clock.frame(frame.head.time_us, Duration::from_micros(self.times.arrived_us)),
+            delay: self.clock.frame(head.time_us, Duration::from_micros(self.times.arrived_us)),
             sequence: Some(place.sequence),
             lost_before: place.dropped,
-            volts: readings.volts().to_vec(),
-            measured_v,
-            says: readings.all_say().to_vec(),
-        })
+            volts: used.volts().to_vec(),
+            measured_v: measured.volts().to_vec(),
+            says: used.all_say().to_vec(),
+            found: found.map(|contacts| Box::new(FoundByBoard { contacts, broken_wires })),
+        });
     }
 }
 

@@ -16,6 +16,8 @@ pub struct Survey {
     pub board: Hello,
     /// Frames that are whole.
     pub frames: u64,
+    /// How many of them have no readings, but what the board has found.
+    pub without_readings: u64,
     /// Time from the first to the last of them (s).
     pub seconds: f64,
     /// Longest time between two of them (s).
@@ -33,16 +35,19 @@ impl Survey {
     /// [`FramesError`] if it cannot be read, is no recording, or does not say of which board it is.
     pub fn of(path: &Path) -> Result<Self, FramesError> {
         let mut recorded = Recorded::open(path)?;
-        let (mut frames, mut last_s, mut longest_pause_s) = (0, 0.0, 0.0_f64);
+        recorded.keep_found();
+        let (mut without_readings, mut frames, mut last_s, mut longest_pause_s) = (0, 0, 0.0, 0.0_f64);
         while let Some(frame) = recorded.next_frame()? {
             let time_s = frame.time_s.unwrap_or(last_s);
             longest_pause_s = longest_pause_s.max(time_s - last_s);
             (frames, last_s) = (frames + 1, time_s);
+            without_readings += u64::from(frame.found_alone().is_some());
         }
         Ok(Self {
             header: recorded.header().clone(),
             board: recorded.board().clone(),
             frames,
+            without_readings,
             seconds: last_s,
             longest_pause_s,
             notes: recorded.notes().to_vec(),

@@ -97,6 +97,12 @@ impl Session {
         }
     }
 
+    /// Asks the board once more for what it sends: contacts begin anew, with readings at rest.
+    pub fn renew_output(&mut self) {
+        self.output.set_in_force(None);
+        self.request_output(self.output.wanted);
+    }
+
     /// What became of what it was [asked to send](Self::request_output): frames, if nothing was.
     pub fn output_state(&self) -> WishState {
         self.output.state()

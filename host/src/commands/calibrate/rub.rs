@@ -97,6 +97,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
         unit: args.reading.unit,
         force: None,
         uncorrected: true,
+        keeps_found: false,
     })?;
     let nominal = reader.measured().cloned().context("a rub needs a detector")?;
     let board = reader.board().map(identity::identity);

@@ -13,7 +13,8 @@ use tactomo::forward::ImageMesh;
 use tactomo::pointer::Pointer;
 use tactomo::readings::Readings;
 use tactomo::run::{Arrival, Frame, TouchEvent};
-use tactomo::sink::Delivery;
+use tactomo::sink::place::Place;
+use tactomo::sink::{Delivery, Renewal};
 use tactomo::solve::Solution;
 use tactomo_cli::output::message;
 
@@ -24,6 +25,9 @@ use crate::commands::streams::Streamed;
 pub struct Recording {
     /// Name of its detector among several; empty if it is alone.
     name: Arc<str>,
+    /// Where its detector lies on a body, if that is told.
+    place: Option<Place>,
+    renewal: Renewal,
     reader: Reader,
     header: Header,
     /// Its length (s), and how far it is solved (s).
@@ -86,13 +90,15 @@ impl Answers {
 }
 
 impl Recording {
-    /// Opens a recording, of a detector of such a name among several; an empty one is alone.
-    pub fn open(name: &str, input: &Input, has_pointer: bool) -> anyhow::Result<Self> {
+    /// Opens a recording, of a detector of such a name among several, which lies there; an empty one is alone.
+    pub fn open(name: &str, place: Option<Place>, input: &Input, has_pointer: bool) -> anyhow::Result<Self> {
         let open = |source| RecordError::Open { path: input.file.to_owned(), source };
         let mut recording = RecordReader::open(input.file)?;
         let last_us = recording.last_time_us().map_err(open)?.unwrap_or_default();
         Ok(Self {
             name: name.into(),
+            place,
+            renewal: Renewal::default(),
             reader: Reader::open(input)?,
             header: recording.header().clone(),
             recorded_s: last_us as f64 * 1e-6,
@@ -115,7 +121,8 @@ impl Recording {
             event.pointer_events = pointer.take(event.frame.time_s(), &event.solution.contacts);
         }
         self.answers += 1;
-        let delivery = Delivery { patch: Arc::clone(&self.name), ..Delivery::at_once(event, &mut self.changes) };
+        let (patch, renews) = (Arc::clone(&self.name), self.renewal.is_due(event.frame.arrived.unix_ns));
+        let delivery = Delivery { patch, renews, ..Delivery::at_once(event, &mut self.changes) };
         Ok(Some(Answer { delivery, number: self.reader.frame() as u64 }))
     }
 
@@ -129,7 +136,7 @@ impl Recording {
         let known = self.reader.measured().zip(self.reader.mesh());
         let (detector, mesh) = known.context("an MCAP file needs a detector")?;
         let streamed = Streamed::of(detector, mesh, self.reader.usual_radius_m(), &self.header.source);
-        Ok(streamed.of_patch(&self.name, None))
+        Ok(streamed.of_patch(&self.name, self.place))
     }
 
     /// Its detector, by name.

@@ -6,23 +6,19 @@ use std::sync::Arc;
 use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::baseline::{BaselineState, BaselineTracker};
 use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
-use tactomo::board::{identity, measured};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
-use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
 use tactomo::readings::Readings;
 use tactomo::run::NewestReadings;
-use tactomo::solve::{
-    ContactSettings, FaultTolerant, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution,
-    Solver,
-};
+use tactomo::solve::{Kernel, Lambda, Method, Presses, Solution, Solver};
 
 use tactomo_protocol::Hello;
 
+use super::by_board::ByBoard;
+use super::opened::Opened;
 use super::units::{self, Unit};
 use tactomo_cli::choice::{DetectorArgs, Model};
-use tactomo_cli::output::message;
 
 /// What is read, and what solves it.
 pub struct Input<'a> {
@@ -46,6 +42,8 @@ pub struct Input<'a> {
     pub force: Option<ForceLaw>,
     /// Leaves out what the detector's known presses correct.
     pub uncorrected: bool,
+    /// Answers frames whose readings a board has not sent by what it has found itself. They have no readings to calibrate by.
+    pub keeps_found: bool,
 }
 
 /// What teaches a solver, on whatever that is.
@@ -80,6 +78,8 @@ pub struct Reader {
     used_v: Vec<f64>,
     /// The detector as it was chosen, of a solver for a detector.
     detector: Option<Detector>,
+    /// What makes answers of frames without readings, once there was one.
+    by_board: Option<ByBoard>,
 }
 
 /// Frames, one after the other.
@@ -91,7 +91,7 @@ enum Frames {
 }
 
 /// What solves frames.
-enum Touch {
+pub enum Touch {
     /// A solver for a detector, as the file's board measures it, and the places of its images.
     Solver {
         solver: Box<dyn Solver>,
@@ -105,7 +105,7 @@ enum Touch {
 }
 
 /// What came before rows of readings.
-struct RowsBefore {
+pub struct RowsBefore {
     newest: NewestReadings,
     /// Board time of the newest (s).
     time_s: f64,
@@ -119,10 +119,7 @@ impl Reader {
         if let Some(taught) = taught.as_ref().map(Learned::method).filter(|taught| *taught != solver) {
             bail!("what was learned is for the solver {}, not {}: leave out --solver", taught.name(), solver.name());
         }
-        let Opened { file, touch, jacobian, chosen } = match taught {
-            Some(Learned::Kernel(kernel)) => learned(input, kernel)?,
-            other => solved(input, solver, other)?,
-        };
+        let Opened { file, touch, jacobian, chosen } = Opened::of(input, solver, taught)?;
         // It is taken as live takes it, while frames are solved.
         let conversions = file.board().map_or(1, |board| board.settings.conversions());
         let baseline = match (&jacobian, input.rest) {
@@ -132,7 +129,17 @@ impl Reader {
         };
         let frames = Frames::of(file, input, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
         let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));
-        Ok(Self { path, frames, baseline, count: 0, given, touch, used_v: Vec::new(), detector: chosen })
+        Ok(Self {
+            path,
+            frames,
+            baseline,
+            count: 0,
+            given,
+            touch,
+            used_v: Vec::new(),
+            detector: chosen,
+            by_board: None,
+        })
     }
 
     /// The detector as it was chosen, before its board was asked; `None` where presses were learned from.
@@ -173,6 +180,11 @@ impl Reader {
     pub fn next_frame(&mut self) -> anyhow::Result<Option<FileFrame>> {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
+            if frame.found_alone().is_some() {
+                self.by_board.get_or_insert_default();
+                self.used_v.clone_from(&frame.volts);
+                return Ok(Some(frame));
+            }
             if self.given == 0 {
                 frame.note_rest(&mut self.baseline);
                 self.used_v.clone_from(&frame.volts);
@@ -216,7 +228,7 @@ impl Reader {
 
     /// Whether the baseline is being taken.
     pub fn is_taking_baseline(&self) -> bool {
-        self.baseline.state().is_taking()
+        self.by_board.as_ref().map_or_else(|| self.baseline.state().is_taking(), |by_board| by_board.is_taking_rest)
     }
 
     /// Radius that contacts have where it is not known (m).
@@ -229,6 +241,11 @@ impl Reader {
 
     /// What a frame's readings (less the baseline) say.
     pub fn solve(&mut self, frame: &FileFrame) -> anyhow::Result<Solution> {
+        if let (Some(found), Some(by_board), Touch::Solver { detector, .. }) =
+            (frame.found_alone(), &mut self.by_board, &self.touch)
+        {
+            return Ok(by_board.solution(found, detector));
+        }
         let touch = self.touch(frame);
         match &mut self.touch {
             Touch::Solver { solver, rows, .. } => {
@@ -250,9 +267,10 @@ impl Reader {
         }
     }
 
-    /// Name of the solver.
+    /// Name of the solver; of frames without readings, of the board's own.
     pub fn name(&self) -> &'static str {
         match &self.touch {
+            _ if self.by_board.is_some() => Method::Core.name(),
             Touch::Solver { solver, .. } => solver.name(),
             Touch::Kernel(_) => Method::Kernel.name(),
         }
@@ -322,92 +340,5 @@ impl Frames {
             Self::Recording(file) => Ok(file.next_frame()?),
             Self::Table(frames) => Ok(frames.next()),
         }
-    }
-}
-
-/// A file and what solves it.
-struct Opened {
-    file: FrameFile,
-    touch: Touch,
-    /// The linear theory of the detector that it must be of, as its board measures it, if that is known.
-    jacobian: Option<Arc<Jacobian>>,
-    /// The same as it was chosen.
-    chosen: Option<Detector>,
-}
-
-/// A kernel that has learned from presses.
-fn learned(input: &Input, kernel: Arc<Kernel>) -> anyhow::Result<Opened> {
-    if input.detector.detector.is_some() || input.detector.material.is_some() {
-        bail!("what was learned from presses needs no detector: leave out --detector and --material");
-    }
-    message!("{}", kernel.sentence());
-    let file = FrameFile::open_by(input.file, Some(kernel.channels()), |table| kernel.readings_of(table))?;
-    if file.channels() != kernel.channels() {
-        bail!(
-            "{} has {} readings a frame, but the presses have {} channels",
-            input.file.display(),
-            file.channels(),
-            kernel.channels()
-        );
-    }
-    Ok(Opened { file, touch: Touch::Kernel(kernel), jacobian: None, chosen: None })
-}
-
-/// A solver for the detector.
-fn solved(input: &Input, method: Method, learned: Option<Learned>) -> anyhow::Result<Opened> {
-    // That of a recording is in its header, unless another one is given.
-    let given = input.detector.get()?.electrodes.len();
-    let mut file = FrameFile::open(input.file, Some(given * given))?;
-    let chosen = match file.header() {
-        Some(header) => input.detector.of_recording(input.file, header)?,
-        None => input.detector.get()?,
-    };
-    let electrodes = chosen.electrodes.len();
-    let detector = match file.board() {
-        Some(board) => {
-            if let Some(notice) = identity::other_board(&chosen, board) {
-                message!("warning: {notice}");
-            }
-            let measured = measured::as_measured(&chosen, board)?;
-            file.set_ground(measured.ground_v);
-            measured
-        }
-        None => chosen.clone(),
-    };
-    let correction = detector.correction.filter(|_| !input.uncorrected);
-    let detector = Detector { force: input.force.clone().or(detector.force), correction, ..detector };
-    if file.channels() != electrodes * electrodes {
-        bail!(
-            "{} has {} readings a frame, but the detector {} with its {electrodes} electrodes needs {}: give the right one with \
-             --detector",
-            input.file.display(),
-            file.channels(),
-            detector.name,
-            electrodes * electrodes
-        );
-    }
-    let problem = Problem::new(input.model.build(&detector, None)?);
-    let problem = match learned {
-        Some(learned) => problem.with_learned(learned)?,
-        None => problem,
-    };
-    let solver = solver(method, input.lambda, &problem)?;
-    let mesh = problem.jacobian.image_mesh.clone();
-    let usual_radius_m = ContactSettings::of(&problem).radius_m;
-    let touch = Touch::Solver { solver, detector: Box::new(detector), mesh, usual_radius_m, rows: None };
-    Ok(Opened { file, touch, jacobian: Some(problem.jacobian), chosen: Some(chosen) })
-}
-
-/// The solver, which leaves out faulty electrodes; or, with a given lambda, of all electrodes.
-fn solver(method: Method, lambda: Option<Lambda>, problem: &Problem) -> anyhow::Result<Box<dyn Solver>> {
-    match lambda.map(Parameter::Lambda) {
-        None => Ok(Box::new(FaultTolerant::new(method, problem)?)),
-        Some(_) if method.parameter() != Some(ParameterKind::Lambda) => {
-            bail!(
-                "the solver {} has no lambda: leave out --lambda, or give a --solver that has one, such as tikhonov",
-                method.name()
-            )
-        }
-        lambda => Ok(method.build_with(problem, lambda)?),
     }
 }

@@ -22,6 +22,7 @@ struct Info<'a> {
     board: &'a str,
     electrodes: u8,
     frames: u64,
+    without_readings: u64,
     seconds: f64,
     frames_per_s: f64,
     longest_pause_s: f64,
@@ -53,6 +54,7 @@ impl<'a> Info<'a> {
             board: &board.board,
             electrodes: board.electrodes,
             frames: survey.frames,
+            without_readings: survey.without_readings,
             seconds: survey.seconds,
             frames_per_s: survey.frames_per_s(),
             longest_pause_s: survey.longest_pause_s,
@@ -91,7 +93,9 @@ fn lost(loss: &RecordingLoss) -> String {
 }
 
 fn in_words(info: &Info, survey: &Survey) -> String {
-    let Info { file, detector, source, notes, board, electrodes, frames, seconds, frames_per_s, .. } = info;
+    let Info {
+        file, detector, source, notes, board, electrodes, frames, without_readings, seconds, frames_per_s, ..
+    } = info;
     let calibrated = survey.notes.iter().any(|(_, note)| matches!(note, Note::Detector { .. }));
     let calibrated = if calibrated { ", calibrated while it was recorded" } else { "" };
     let mut lines = vec![
@@ -105,6 +109,11 @@ fn in_words(info: &Info, survey: &Survey) -> String {
         ),
         format!("  loss       {}", info.loss),
     ];
+    if *without_readings > 0 {
+        lines.push(format!(
+            "  contacts   {without_readings} frames have no readings, but the contacts that the board found"
+        ));
+    }
     if !notes.is_empty() {
         lines.push(format!("  notes      {notes}"));
     }

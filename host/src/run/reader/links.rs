@@ -137,7 +137,7 @@ impl Reader {
                     return lost(link, error, comes_back);
                 }
             }
-            if connection.session.output_state() == WishState::Refused {
+            if connection.answers && connection.session.output_state() == WishState::Refused {
                 let error = LiveError::NoContacts { link: link.name() };
                 // When it is opened again it is given its table again.
                 return if comes_back { Ok(End::Lost(with_causes(&error))) } else { Err(error) };

@@ -39,6 +39,7 @@ pub fn gather(args: &PressArgs, known: &Known) -> anyhow::Result<Gathered> {
         unit: args.reading.unit,
         force: Some(ForceLaw::siemens()),
         uncorrected: false,
+        keeps_found: false,
     })?;
     let presses = match (reader.is_recording(), known) {
         (true, Known::Presses(forces)) => of_plateaus(&mut reader, forces)?,

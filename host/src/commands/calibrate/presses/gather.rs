@@ -77,6 +77,7 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
         // Conductances with their constriction, as laws of force have them.
         force: Some(ForceLaw::siemens()),
         uncorrected: true,
+        keeps_found: false,
     })?;
     let detector = reader.detector().cloned().context("presses need a detector")?;
     let known = super::known(args, reader.is_recording(), &detector)?;

@@ -104,6 +104,7 @@ fn solution(answer: &Answer) -> Solution {
         flags: Flags {
             saturated: flags.has(CoreFlags::SATURATED),
             misfit: flags.has(CoreFlags::MISFIT) || flags.has(CoreFlags::MORE),
+            calibrate: flags.has(CoreFlags::CALIBRATE),
             ..Flags::default()
         },
         ..Solution::default()

@@ -19,8 +19,9 @@ use crate::solve::fit::linear::full_v;
 use crate::solve::fit::target::{PAD_ERROR, model_error};
 use crate::solve::problem::Problem;
 
-/// Coefficients of each quantity, about.
-const COEFFICIENTS: usize = 1200;
+/// Cells, about. Of 390 random scenes of one to three discs on `square-60` 27 contacts are invented with 35 cells along a side (106 kB), 35 with 34 (100 kB) and 35
+/// with 33 (95 kB); 66, 73 and 73 are missed.
+const CELLS: usize = 1200;
 /// Fewest cells along a side.
 const LEAST_CELLS: usize = 6;
 /// Places along each side of a cell that splines are fitted to.
@@ -102,7 +103,7 @@ impl Grid {
     fn of(problem: &Problem) -> Self {
         let [low_m, high_m] = problem.detector().outline.bounds();
         let size_m = [0, 1].map(|axis| high_m[axis] - low_m[axis]);
-        let step_m = (size_m[0] * size_m[1] / COEFFICIENTS as f64).sqrt();
+        let step_m = (size_m[0] * size_m[1] / CELLS as f64).sqrt();
         let cells = size_m.map(|size_m| ((size_m / step_m).round() as usize).clamp(LEAST_CELLS, MAX_SIDE - 3));
         Self { low_m, step_m: [0, 1].map(|axis| size_m[axis] / cells[axis] as f64), cells }
     }
