@@ -29,8 +29,12 @@ pub struct Head {
     pub on_resistance_ohm: f32,
     /// Standard deviation of a reading by noise and rounding (V).
     pub noise_v: f32,
-    /// Error of the fields, as a share of the largest reading.
+    /// Error of the readings of contacts, as they are fitted, as a share of the largest: of the fields, and of what is not known of the detector.
     pub model_share: f32,
+    /// Root mean square of how far what is not known of the detector moves contacts along each axis (m), while the readings fit.
+    pub shift_m: f32,
+    /// Of how far it changes the logarithms of their conductances.
+    pub ln_conductance_error: f32,
     /// Error of a pad's own impedance, as a share of it.
     pub pad_share: f32,
     /// Readings from here on say nothing (V).
@@ -55,7 +59,7 @@ pub struct Head {
 pub const EVEN_SPREADING: f64 = 8.0 / (3.0 * PI * PI);
 
 /// How many numbers those are.
-pub(crate) const NUMBERS: usize = 22;
+pub(crate) const NUMBERS: usize = 24;
 
 impl Head {
     /// Whether a law of force is known.
@@ -93,6 +97,8 @@ impl Head {
             self.on_resistance_ohm,
             self.noise_v,
             self.model_share,
+            self.shift_m,
+            self.ln_conductance_error,
             self.pad_share,
             self.full_v,
             self.sheet_s,
@@ -128,6 +134,8 @@ impl Head {
             on_resistance_ohm: next(),
             noise_v: next(),
             model_share: next(),
+            shift_m: next(),
+            ln_conductance_error: next(),
             pad_share: next(),
             full_v: next(),
             sheet_s: next(),
@@ -154,7 +162,8 @@ impl Head {
             ("drive", above(self.drive_v)),
             ("on-resistance", not_below(self.on_resistance_ohm)),
             ("noise", above(self.noise_v)),
-            ("error of the fields", not_below(self.model_share)),
+            ("error of the readings", not_below(self.model_share)),
+            ("errors of contacts", not_below(self.shift_m) && not_below(self.ln_conductance_error)),
             ("error of pads", not_below(self.pad_share)),
             ("full scale", above(self.full_v)),
             ("sheet conductance", above(self.sheet_s)),

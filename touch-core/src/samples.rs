@@ -54,6 +54,8 @@ pub(crate) fn table() -> Vec<u8> {
         on_resistance_ohm: 4.0,
         noise_v: 0.0012,
         model_share: 0.0003,
+        shift_m: 0.0,
+        ln_conductance_error: 0.0,
         pad_share: 0.03,
         full_v: 1.99,
         sheet_s: 1.1e-3,

@@ -219,8 +219,11 @@ impl Solver {
         let (loaded, radius_m) = (&self.circuit.loaded[k], table.head().radius_m);
         let first = PARAMETERS * k;
         let of = |i: usize, j: usize| covariance.map_or(f32::INFINITY, |all| all[first + i][first + j]);
-        let [x, y, log_radius] = [0, 1, 3].map(|i| libm::sqrtf(of(i, i).max(0.0)));
-        let variance = loaded.conductance_variance(table, radius_m, of);
+        let log_radius = libm::sqrtf(of(3, 3).max(0.0));
+        let shift = table.head().shift_m / radius_m;
+        let [x, y] = [0, 1].map(|i| libm::sqrtf(of(i, i).max(0.0) + shift * shift));
+        let of_detector = table.head().ln_conductance_error;
+        let variance = loaded.conductance_variance(table, radius_m, of) + of_detector * of_detector;
         let conductance_s = loaded.conductance_s();
         let apparent_conductance_s = 1.0 / (loaded.share * loaded.ohm);
         Contact {

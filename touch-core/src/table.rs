@@ -14,8 +14,8 @@
 //! | 14 | u16 | zero |
 //! | 16 | u32 | bytes of the whole table |
 //! | 20 | u32 | CRC-32 of the electrodes' places, three `f32` each (m): tables of another layout have another |
-//! | 24 | 22 f32 | [`Head`], in the order of its fields |
-//! | 112 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
+//! | 24 | 24 f32 | [`Head`], in the order of its fields |
+//! | 120 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
 //! | | 2 n f32 | of each channel the gain, and what it reads too much though at rest it does not show (V) |
 //! | | k f32 | coefficients of the spline `d` of `N` by distance (ohm), over `ln r` |
 //! | | (n + 1)(n + 2) / 2 f32 | `Q`, symmetric, as the fields above (1/ohm, none, ohm) |
@@ -40,7 +40,7 @@ use crate::spline::interval;
 /// First bytes of a table.
 pub const MAGIC: [u8; 4] = *b"TCtb";
 /// Version of the format.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// Most electrodes.
 pub const MAX_ELECTRODES: usize = 32;
 /// Most coefficients along a side.

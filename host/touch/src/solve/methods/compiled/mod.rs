@@ -4,6 +4,7 @@ mod between;
 mod table;
 #[cfg(test)]
 mod tests;
+mod unknown;
 
 use std::sync::Arc;
 

@@ -6,15 +6,15 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-use tactomo_physics::detector::{Detector, ForceLaw};
-use tactomo_physics::forward::{ForwardError, readings_v};
-use tactomo_physics::readings::Readings;
+use tactomo_physics::detector::ForceLaw;
+use tactomo_physics::forward::ForwardError;
 use tactomo_physics::scene::Contact;
 use tactomo_touch_core::Contents;
 use tactomo_touch_core::spline::{interval, weights};
 use tactomo_touch_core::table::{EVEN_SPREADING, Head, MAX_ELECTRODES, MAX_SIDE, OTHERS, RADII};
 
 use super::between::Between;
+use super::unknown::{Unknown, tried_m};
 use crate::solve::fit::linear::full_v;
 use crate::solve::fit::target::{PAD_ERROR, model_error};
 use crate::solve::problem::Problem;
@@ -35,9 +35,6 @@ const DISCS: [f64; RADII] = [0.6, 2.2];
 /// What readings by a table are off from the model's, as a share of the largest: of 150 random scenes of one to three discs on `square-60` as many have the
 /// right number of contacts with 0.0003, 0.0007 and 0.001 (134, 133 and 131), and with more fewer; wide firm ones alone are split less with more.
 const TABLE_SHARE: f64 = 0.0006;
-/// Places that errors of the detector are taken at, as shares of the outline's sides.
-const TRIED: [[f64; 2]; 5] = [[0.5, 0.5], [0.25, 0.3], [0.7, 0.25], [0.3, 0.75], [0.8, 0.7]];
-
 /// Why a detector has no table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -242,6 +239,7 @@ fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
 
 fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
     let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
+    let unknown = Unknown::of(problem);
     // Without one, or where nothing is left of it, there is no scale for forces.
     let constriction_ohm = constriction_ohm(problem).filter(|ohm| *ohm > 0.0);
     let law = detector.force.as_ref().filter(|_| constriction_ohm.is_some());
@@ -258,7 +256,9 @@ fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
         drive_v: detector.drive_v as f32,
         on_resistance_ohm: detector.on_resistance_ohm as f32,
         noise_v: detector.adc.deviation_v() as f32,
-        model_share: model_error(&*problem.model).hypot(TABLE_SHARE).hypot(detector_share(problem)) as f32,
+        model_share: model_error(&*problem.model).hypot(TABLE_SHARE).hypot(unknown.share) as f32,
+        shift_m: unknown.place_m as f32,
+        ln_conductance_error: unknown.ln_conductance as f32,
         pad_share: PAD_ERROR as f32,
         full_v: full_v(detector) as f32,
         sheet_s: detector.sheet_conductance_s() as f32,
@@ -282,43 +282,6 @@ fn constriction_ohm(problem: &Problem) -> Option<f64> {
     let beyond_even_ohm = *of_disc(problem, [x_m, y_m], radius_m).ok()?.get(spot.electrodes_ohm.len())?;
     let disc_ohm = beyond_even_ohm + EVEN_SPREADING / (top_s_per_m(problem) * radius_m);
     Some(problem.constriction_ohm()? - (spot_ohm - disc_ohm))
-}
-
-/// Places that stand for all of a detector (m).
-fn tried_m(problem: &Problem) -> impl Iterator<Item = [f64; 2]> {
-    let outline = &problem.detector().outline;
-    let [low_m, high_m] = outline.bounds();
-    let at = move |share: [f64; 2]| [0, 1].map(|axis| low_m[axis] + share[axis] * (high_m[axis] - low_m[axis]));
-    TRIED.into_iter().map(at).filter(|place_m| outline.holds(*place_m))
-}
-
-/// What readings of contacts are off by, as nobody knows the detector and the gains and bows of its converters exactly: root mean square over readings and contacts at
-/// some places, as a share of the largest reading.
-fn detector_share(problem: &Problem) -> f64 {
-    let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
-    let squares = tried_m(problem).filter_map(|[x_m, y_m]| {
-        let contacts = [Contact::flat(x_m, y_m, radius_m, detector.sheet_conductance_s())];
-        let readings = readings_v(&problem.model.impedance_ohm(&contacts).ok()?, detector);
-        let of_tolerances_v2 = match problem.nuisance() {
-            Some(nuisance) => nuisance.patterns_v(&contacts, detector).ok()?.norm_squared(),
-            None => 0.0,
-        };
-        let count = readings.volts().len() as f64;
-        Some((of_tolerances_v2 + converters_v2(detector, &readings)) / count / readings.largest_v().powi(2))
-    });
-    let squares: Vec<_> = squares.collect();
-    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
-}
-
-/// Sum of the squares of what gains and bows of the converters change in readings, of one standard deviation each (V2).
-fn converters_v2(detector: &Detector, readings: &Readings) -> f64 {
-    let of_electrode = |e: usize| -> f64 {
-        let converter = detector.electrodes[e].converter;
-        let Some(converter) = detector.converters.get(converter) else { return 0.0 };
-        let changes_v = (0..readings.electrodes()).flat_map(|g| converter.changes_v(readings.at(g, e)));
-        changes_v.map(|change_v| change_v * change_v).sum()
-    };
-    (0..readings.electrodes()).map(of_electrode).sum()
 }
 
 /// How a quantity's coefficients are stored.

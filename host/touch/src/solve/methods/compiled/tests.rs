@@ -157,11 +157,13 @@ fn a_described_detector_is_trusted_less_than_an_exact_one() {
         f64::from(Table::read(&bytes).unwrap().head().model_share)
     };
     let [exact, described] = [model_share(&detector()), model_share(&Detector::preset("square-60").unwrap())];
-    assert!(exact < 1e-3 && (0.01..0.2).contains(&described), "{exact} {described}");
-    // Gains of 1 % and bows of 12 mV, as an ESP32 has.
+    assert!(exact < 1e-3 && (0.01..0.05).contains(&described), "{exact} {described}");
+    // Gains of 1 % and bows of 12 mV, of two converters, as an ESP32 has: what a firmer contact does too is no error.
     let errors = ConverterErrors { gain_share: 0.01, bow_v: 0.012, range_v: [0.142, 3.1] };
-    let on_a_chip = model_share(&Detector { converters: [errors].into(), ..detector() });
-    assert!((0.005..0.012).contains(&on_a_chip), "{on_a_chip}");
+    let mut on_a_chip = Detector { converters: vec![errors; 2], ..detector() };
+    on_a_chip.electrodes[8..].iter_mut().for_each(|pad| pad.converter = 1);
+    let on_a_chip = model_share(&on_a_chip);
+    assert!((0.005..0.015).contains(&on_a_chip), "{on_a_chip}");
 }
 
 #[test]
