@@ -24,6 +24,8 @@ pub(crate) const PATIENCE: [u32; 2] = [1, 64];
 
 /// Standard errors have to be above this times those by noise alone for a calibration to be worth it: the host's.
 const CALIBRATION_WORTH: f32 = 2.0;
+/// What a fit may have left to gain (squared deviations), ten times what a step is not taken for.
+const UNFINISHED: f32 = 1.0;
 
 /// A frame to be explained.
 #[derive(Clone, Copy)]
@@ -247,5 +249,5 @@ fn is_to_be_calibrated(fit: &Fit, Task { table, errors, .. }: Task<'_>) -> bool 
     let noise_v = table.head().noise_v;
     let of_noise = errors.variance_v2 / (noise_v * noise_v);
     let is_worth_it = of_noise > CALIBRATION_WORTH * CALIBRATION_WORTH;
-    is_worth_it && of_noise * fit.normal.cost > limit(errors.count as f32 - freedom(fit))
+    is_worth_it && of_noise * (fit.normal.cost - UNFINISHED) > limit(errors.count as f32 - freedom(fit))
 }

@@ -73,9 +73,6 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Touch for Digitizer<S,
         let can = self.bounds_m.is_some() || !output.has_contacts();
         if can {
             self.output = output;
-            if output.has_contacts() {
-                self.finder.restart();
-            }
         }
         can
     }

@@ -24,7 +24,7 @@ pub trait Touch {
     /// What is streamed.
     fn output(&self) -> Output;
 
-    /// Streams this from now on, and begins anew if that is contacts; returns whether it can. If not, it stays as it was.
+    /// Streams this from now on; returns whether it can. If not, it stays as it was. Contacts begin [anew](Self::restart) then, but for those that go elsewhere too.
     fn set_output(&mut self, output: Output) -> bool;
 
     /// Takes a piece of a table; returns whether it can be part of one that fits the board.

@@ -64,3 +64,23 @@ fn contact(code: &ContactCode) -> FoundContact {
         ..FoundContact::flat(x_m, y_m, conductance_s)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_protocol::{Contacts, FrameHead};
+
+    #[test]
+    fn broken_wires_are_told_of_while_the_board_leaves_them_out() {
+        let (head, flags) = (FrameHead::default(), ContactFlags::default());
+        let mut contacts = Contacts { head, flags, found: Default::default() };
+        let excluded = |contacts: &Contacts| {
+            let found = FoundByBoard { contacts: contacts.clone(), broken_wires: 1 << 5 | 1 << 9 };
+            solution(&found).flags
+        };
+        assert_eq!(excluded(&contacts), Flags::default());
+        contacts.flags.raise(ContactFlags::FAULT);
+        let Flags { excluded, faults, .. } = excluded(&contacts);
+        assert_eq!((excluded, faults), (vec![5, 9], vec![ElectrodeFault::Open; 2]));
+    }
+}

@@ -45,6 +45,19 @@ fn a_press_in_the_first_frame_is_told_and_rest_is_learned_when_it_goes() {
 }
 
 #[test]
+fn contacts_that_are_asked_for_once_more_begin_anew_with_rest() {
+    let mut bench = Bench::new(finder(table_memory()));
+    bench.command(Command::Output(Output::Contacts));
+    bench.command(Command::Start);
+    let mut resting = simulation(&[]);
+    let before = bench.scan(&mut resting, 80);
+    bench.command(Command::Output(Output::Contacts));
+    let after = bench.scan(&mut resting, 80);
+    let is_resting = |contacts: &Contacts| contacts.flags.has(ContactFlags::RESTING);
+    assert_eq!([&before[79], &after[1], &after[79]].map(is_resting), [false, true, false]);
+}
+
+#[test]
 fn a_broken_wire_is_told_once_and_contacts_are_found_without_it() {
     let mut bench = Bench::new(finder(table_memory()));
     bench.command(Command::Output(Output::Contacts));

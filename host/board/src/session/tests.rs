@@ -218,6 +218,12 @@ fn contacts_are_asked_for_and_a_board_that_another_host_has_left_sending_them_is
     session.hello(&hello(tag, Settings::default(), true), now);
     session.frame(now);
     assert_eq!((session.output_state(), said(&mut session, now)), (WishState::InForce, None));
+    // The same once more begins contacts anew.
+    session.renew_output();
+    let (tag, command) = said(&mut session, now).unwrap();
+    assert_eq!(command, Command::Output(Output::Frames));
+    session.hello(&hello(tag, Settings::default(), true), now);
+    assert_eq!((session.output_state(), said(&mut session, now)), (WishState::InForce, None));
     session.request_output(Output::Contacts);
     let (tag, command) = said(&mut session, now).unwrap();
     assert_eq!((command, session.output_state()), (Command::Output(Output::Contacts), WishState::Pending));

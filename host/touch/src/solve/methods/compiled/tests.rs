@@ -167,20 +167,33 @@ fn a_described_detector_is_trusted_less_than_an_exact_one() {
 }
 
 #[test]
-fn what_a_calibration_would_tell_is_asked_for_where_readings_are_off() {
+fn on_detectors_as_built_contacts_are_counted_and_a_calibration_is_asked_for() {
     let described = Detector::preset("square-60").unwrap();
     let mut solver = Compiled::new(&Problem::of(&described).unwrap()).unwrap();
-    let near = [disc(0.004, -0.011, 0.003, 1.0), disc(-0.008, -0.006, 0.003, 1.0), disc(0.002, 0.004, 0.003, 1.0)];
-    let mut ask = |built: &Detector, discs: &[Disc]| {
+    let mut solve = |built: &Detector, discs: &[Disc]| {
         solver.reset();
         let slab = Slab::with_resolution(built, Resolution::FINE).unwrap();
         let readings = readings_v(&slab.impedance_ohm(discs).unwrap(), built);
-        solver.solve(&measured(&readings, &built.adc, &mut Noise::new(3))).unwrap().flags.calibrate
+        solver.solve(&measured(&readings, &built.adc, &mut Noise::new(3))).unwrap()
     };
-    assert!(!ask(&described, &near[..1]), "as described");
-    // Three near each other may be one that fits, but for what the table leaves open.
-    let asked = (0..6).filter(|seed| ask(&drawn(&described, *seed), &near)).count();
-    assert_eq!(asked, 6);
+    let all = [disc(0.011, -0.013, 0.003, 0.5), disc(-0.012, 0.008, 0.003, 0.5)];
+    assert!(all.iter().all(|disc| !solve(&described, &[*disc]).flags.calibrate), "it is as described");
+    let (mut right, mut within, mut places) = (0, 0, 0);
+    for built in (0..8).map(|seed| drawn(&described, seed)) {
+        for count in 1..=all.len() {
+            let solution = solve(&built, &all[..count]);
+            assert!(solution.flags.calibrate && !solution.flags.misfit, "{solution:?}");
+            right += usize::from(solution.contacts.len() == count);
+            for found in solution.contacts.iter().filter(|_| solution.contacts.len() == count) {
+                let nearest_m = all[..count].iter().map(|disc| off_m(found, disc)).fold(f64::MAX, f64::min);
+                let known = found.uncertainty.unwrap();
+                within += usize::from(nearest_m < 2.0 * known.x_m.hypot(known.y_m));
+                places += 1;
+            }
+        }
+    }
+    assert!(right >= 14, "{right} of 16");
+    assert!(10 * within >= 9 * places, "{within} of {places}");
 }
 
 #[test]
