@@ -1,13 +1,13 @@
 //! The thread that receives: it reads, stamps, records, decodes and counts, and never waits for a disk, a page or a solver, but where each
 //! frame of a recording is to be answered.
 
+mod by_board;
 mod links;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use tactomo_board::frames::FoundByBoard;
 use tactomo_board::identity;
 use tactomo_board::link::{Control, Link, Playing};
 use tactomo_board::measured::{self, Volts};
@@ -17,16 +17,14 @@ use tactomo_board::session::{self, GreetError};
 use tactomo_board::source::Source;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
-use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::SceneName;
-use tactomo_protocol::{BoardMessage, Contacts, DecodeError, Fault, Hello, Output};
+use tactomo_protocol::{BoardMessage, Contacts, DecodeError, Fault, Hello};
 
 use super::connection::Connection;
 use super::course::Course;
 use super::follower::FollowThread;
-use super::found;
 use super::frame::{Arrival, Frame, NewestReadings, Rows};
-use super::inbox::{Event, Found, Inbox, Taken};
+use super::inbox::{Event, Inbox, Taken};
 use super::notice::NoticeBoard;
 use super::options::{Ends, LiveError, RunOptions, Summary};
 use super::recordings::Recordings;
@@ -276,63 +274,6 @@ impl Reader {
         let (status, lost) = (frame.head.status, self.frames_lost);
         let frame = Frame { sequence, board_time_us, arrived, delay, status, lost, measured, used };
         self.inbox.put_frame(Taken::new(frame, rows, found), board.noise_v);
-    }
-
-    /// Takes contacts that the board has found; where their readings come too, these bring them along.
-    fn contacts(&mut self, connection: &mut Connection, contacts: Contacts, received: Instant) {
-        let (Some(board), Some(_)) = (&self.board, connection.junk) else { return };
-        if !connection.answers && board.detector.force.is_some() {
-            self.options.table.compile_once(&board.detector);
-        }
-        connection.session.contacts(received);
-        connection.landed();
-        match self.options.output {
-            Output::Contacts => self.contacts_alone(connection, &contacts, received),
-            Output::Frames if connection.answers => {}
-            // Of a recording nobody knows whether readings follow before something else does.
-            Output::Frames | Output::Both => {
-                self.take_found_alone(connection, received);
-                self.found = Some(contacts);
-            }
-        }
-    }
-
-    /// Takes contacts whose readings have not come.
-    fn take_found_alone(&mut self, connection: &mut Connection, received: Instant) {
-        if let Some(contacts) = self.found.take() {
-            self.contacts_alone(connection, &contacts, received);
-        }
-    }
-
-    fn contacts_alone(&mut self, connection: &mut Connection, contacts: &Contacts, received: Instant) {
-        let Some(board) = &self.board else { return };
-        let place = self.sequence.place(&contacts.head);
-        self.frames_lost += place.dropped;
-        self.notice.count(|meter| meter.frame(received, &contacts.head, place.dropped));
-        if !self.follows {
-            return;
-        }
-        let nothing = Readings::from_fn(board.hello.electrodes.into(), |_, _| 0.0).hiding(|_, _| true);
-        let first = Frame::first(nothing.clone(), nothing, Arrival::at(received));
-        let frame = Frame {
-            sequence: place.sequence,
-            board_time_us: place.time_us,
-            delay: connection.session.delay(contacts.head.time_us, received),
-            status: contacts.head.status,
-            lost: self.frames_lost,
-            ..first
-        };
-        let found = self.found_on_board(contacts, false);
-        self.inbox.put_frame(Taken::new(frame, Vec::new(), Some(found)), board.noise_v);
-    }
-
-    fn found_on_board(&self, contacts: &Contacts, has_readings: bool) -> Found {
-        let by_board = FoundByBoard { contacts: contacts.clone(), broken_wires: self.broken_wires };
-        let mut found = found::found(&by_board, has_readings);
-        if let Some(law) = &self.options.detector.force {
-            self.options.table.add_newtons(law, &mut found.solution.contacts);
-        }
-        found
     }
 
     fn is_timed_out(&self) -> bool {
