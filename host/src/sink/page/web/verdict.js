@@ -13,7 +13,7 @@ const ANNOUNCED_MS = 1000;
 const WARNINGS = {
   saturated: ["at its limit", "Readings at the end of the converter's range, or contacts that conduct so well that pressing harder would change nothing"],
   misfit: ["readings do not fit", "The readings are not what the model gives for what was found: another sensor, a fault, or something that is no contact"],
-  calibrate: ["sensor differs from its description", "The sensor differs from its description, and places are less sure for it: it is learned from what presses, or calibrated at once (K)"],
+  calibrate: ["sensor not as described", "The sensor differs from its description, and places are less sure for it: it is learned from what presses, or calibrated at once (K)"],
 };
 
 function chip(kind, text, title) {

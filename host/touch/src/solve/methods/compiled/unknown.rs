@@ -18,7 +18,8 @@ const STEP: f64 = 0.05;
 /// What changes readings by less than this, as a share of what changes them most, takes nothing up: strength against width of a firm contact.
 const LEAST_PART: f64 = 0.01;
 /// Standard deviations above the mean that the sum of squares of what converters leave is taken at: two gains and two bows are too few to be near their mean. What
-/// tolerances leave is taken as its mean: 1 of 240 scenes on 40 detectors as built does not fit then.
+/// tolerances leave is taken as its mean: of single contacts on detectors as built (`study built --seed 9`) 85, 88 and 89 % are one with 0, 1 and 2 deviations, of pairs
+/// 67, 62 and 48 % are two.
 const DEVIATIONS: f64 = 2.0;
 /// Parameters of a contact that take up errors: place, strength and width.
 const PARAMETERS: usize = 4;
