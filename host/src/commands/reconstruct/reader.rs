@@ -78,8 +78,9 @@ pub struct Reader {
     used_v: Vec<f64>,
     /// The detector as it was chosen, of a solver for a detector.
     detector: Option<Detector>,
-    /// What makes answers of frames without readings, once there was one.
-    by_board: Option<ByBoard>,
+    /// What makes answers of frames without readings, and whether the newest is one.
+    by_board: ByBoard,
+    is_by_board: bool,
 }
 
 /// Frames, one after the other.
@@ -138,7 +139,8 @@ impl Reader {
             touch,
             used_v: Vec::new(),
             detector: chosen,
-            by_board: None,
+            by_board: ByBoard::default(),
+            is_by_board: false,
         })
     }
 
@@ -180,8 +182,8 @@ impl Reader {
     pub fn next_frame(&mut self) -> anyhow::Result<Option<FileFrame>> {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
-            if frame.found_alone().is_some() {
-                self.by_board.get_or_insert_default();
+            self.is_by_board = frame.found_alone().is_some();
+            if self.is_by_board {
                 self.used_v.clone_from(&frame.volts);
                 return Ok(Some(frame));
             }
@@ -228,7 +230,7 @@ impl Reader {
 
     /// Whether the baseline is being taken.
     pub fn is_taking_baseline(&self) -> bool {
-        self.by_board.as_ref().map_or_else(|| self.baseline.state().is_taking(), |by_board| by_board.is_taking_rest)
+        if self.is_by_board { self.by_board.is_taking_rest } else { self.baseline.state().is_taking() }
     }
 
     /// Radius that contacts have where it is not known (m).
@@ -241,10 +243,8 @@ impl Reader {
 
     /// What a frame's readings (less the baseline) say.
     pub fn solve(&mut self, frame: &FileFrame) -> anyhow::Result<Solution> {
-        if let (Some(found), Some(by_board), Touch::Solver { detector, .. }) =
-            (frame.found_alone(), &mut self.by_board, &self.touch)
-        {
-            return Ok(by_board.solution(found, detector));
+        if let (Some(found), Touch::Solver { detector, .. }) = (frame.found_alone(), &self.touch) {
+            return Ok(self.by_board.solution(found, detector));
         }
         let touch = self.touch(frame);
         match &mut self.touch {
@@ -267,10 +267,10 @@ impl Reader {
         }
     }
 
-    /// Name of the solver; of frames without readings, of the board's own.
+    /// Name of the solver; where the newest frame has no readings, of the board's own.
     pub fn name(&self) -> &'static str {
         match &self.touch {
-            _ if self.by_board.is_some() => Method::Core.name(),
+            _ if self.is_by_board => Method::Core.name(),
             Touch::Solver { solver, .. } => solver.name(),
             Touch::Kernel(_) => Method::Kernel.name(),
         }
