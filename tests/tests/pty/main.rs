@@ -91,6 +91,26 @@ fn a_flood_without_zeros_ends_with_the_next_frame() {
 }
 
 #[test]
+fn a_million_random_bytes_on_each_port_at_once_cost_no_frame_behind_them() {
+    let on_port = |seed: u64| {
+        let mut board = Board::plug(&format!("random-{seed}"));
+        let host = Host::start(board.port());
+        board.greet();
+        board.frames(10);
+        let mut random = fastrand::Rng::with_seed(seed);
+        board.raw(&std::iter::repeat_with(|| random.u8(..)).take(1 << 20).collect::<Vec<_>>());
+        // What they end with is no packet's beginning.
+        board.raw(&[0]);
+        board.frames(20);
+        host.wait_for_frames(30);
+        let summary = host.finish().unwrap();
+        assert_eq!((summary.frames, summary.dropped), (30, 0), "port {seed}");
+        assert!(summary.corrupt > 1000, "{} of port {seed}", summary.corrupt);
+    };
+    thread::scope(|ports| (1..=4).for_each(|seed| _ = ports.spawn(move || on_port(seed))));
+}
+
+#[test]
 fn a_board_that_stalls_is_waited_for_and_asked_again() {
     let mut board = Board::plug("stall");
     let host = Host::start(board.port());
