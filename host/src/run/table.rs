@@ -103,7 +103,7 @@ impl BoardTable {
     }
 
     /// Compiles the table of a detector, as its board measures it, once: for newtons of contacts that were recorded. A recording waits for that second.
-    pub(super) fn compile_once(&self, detector: &Detector) {
+    pub fn compile_once(&self, detector: &Detector) {
         self.0.is_compiled.get_or_init(|| {
             let compiled = || Ok(compile(&Problem::of(detector)?)?);
             match compiled() {
@@ -116,7 +116,7 @@ impl BoardTable {
     }
 
     /// Adds newtons to contacts that the board has found.
-    pub(super) fn add_newtons(&self, law: &ForceLaw, contacts: &mut [FoundContact]) {
+    pub fn add_newtons(&self, law: &ForceLaw, contacts: &mut [FoundContact]) {
         // It was checked when it was given.
         solve::add_newtons(&self.0.bytes.lock().unwrap_or_else(PoisonError::into_inner), law, contacts);
     }

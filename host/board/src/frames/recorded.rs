@@ -207,16 +207,16 @@ impl Recorded {
 
     pub(super) fn next_frame(&mut self) -> Result<Option<FileFrame>, FramesError> {
         loop {
-            let frames = std::iter::from_fn(|| self.frames.pop_front());
-            let frame = frames.into_iter().find(|frame| self.keeps_found || frame.found_alone().is_none());
+            let mut frames = std::iter::from_fn(|| self.frames.pop_front());
+            let frame = frames.find(|frame| self.keeps_found || frame.found_alone().is_none());
             if frame.is_some() {
                 return Ok(frame);
             }
             let Some(entry) = read(&mut self.reader, &mut self.chunk, &self.path)? else {
-                match self.found.is_some() {
-                    true => self.end_found(),
-                    false => return Ok(None),
+                if self.found.is_none() {
+                    return Ok(None);
                 }
+                self.end_found();
                 continue;
             };
             match entry.note {
