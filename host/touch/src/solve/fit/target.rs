@@ -28,6 +28,23 @@ pub(crate) fn model_error(model: &dyn ForwardModel) -> f64 {
     if model.name() == "shell" { 0.0015 } else { 0.0003 }
 }
 
+/// What gains and bows of converters change in readings, of one standard deviation each (V): two columns each. `of_electrode` tells which one reads an electrode.
+pub(crate) fn converter_patterns_v(
+    readings: &Readings,
+    converters: &[ConverterErrors],
+    of_electrode: impl Fn(usize) -> usize,
+) -> DMatrix<f64> {
+    let n = readings.electrodes();
+    let mut patterns_v = DMatrix::zeros(n * n, 2 * converters.len());
+    for (g, e) in (0..n).flat_map(|g| (0..n).map(move |e| (g, e))) {
+        let index = of_electrode(e);
+        let Some(converter) = converters.get(index) else { continue };
+        let changes_v = converter.changes_v(readings.touch_v(g, e));
+        (0..2).for_each(|kind| patterns_v[(g * n + e, 2 * index + kind)] = changes_v[kind]);
+    }
+    patterns_v
+}
+
 /// What is known of the errors of readings.
 #[derive(Clone, Debug)]
 pub(crate) struct Errors {
@@ -75,12 +92,9 @@ impl Errors {
         let of_pads = self.pad_patterns_v(readings);
         let mut patterns_v = DMatrix::zeros(n * n, n + 2 * self.converters.len());
         of_pads.iter().enumerate().for_each(|(i, volts)| patterns_v[(i, i / n)] = *volts);
-        for (g, e) in (0..n).flat_map(|g| (0..n).map(move |e| (g, e))) {
-            let index = self.converter_of.get(e).copied().unwrap_or_default();
-            let Some(converter) = self.converters.get(index) else { continue };
-            let changes_v = converter.changes_v(readings.touch_v(g, e));
-            (0..2).for_each(|kind| patterns_v[(g * n + e, n + 2 * index + kind)] = changes_v[kind]);
-        }
+        let of_electrode = |e: usize| self.converter_of.get(e).copied().unwrap_or_default();
+        let of_converters = converter_patterns_v(readings, &self.converters, of_electrode);
+        patterns_v.columns_mut(n, of_converters.ncols()).copy_from(&of_converters);
         patterns_v
     }
 

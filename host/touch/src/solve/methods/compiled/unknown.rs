@@ -5,10 +5,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::solve::fit::target::converter_patterns_v;
 use crate::solve::problem::Problem;
-use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::readings_v;
-use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
 /// Places that stand for all of a detector, as shares of the outline's sides.
@@ -56,7 +55,8 @@ impl Unknown {
         let contact = Contact::flat(x_m, y_m, radius_m, detector.sheet_conductance_s());
         let read = |contact: Contact| Some(readings_v(&problem.model.impedance_ohm(&[contact]).ok()?, detector));
         let readings = read(contact)?;
-        let mut unknown_v = converter_patterns_v(detector, &readings);
+        let of_electrode = |e: usize| detector.electrodes[e].converter;
+        let mut unknown_v = converter_patterns_v(&readings, &detector.converters, of_electrode);
         let converters = unknown_v.ncols();
         if let Some(nuisance) = problem.nuisance() {
             let of_tolerances_v = nuisance.patterns_v(&[contact], detector).ok()?;
@@ -97,17 +97,4 @@ pub(super) fn tried_m(problem: &Problem) -> impl Iterator<Item = [f64; 2]> {
     let [low_m, high_m] = outline.bounds();
     let at = move |share: [f64; 2]| [0, 1].map(|axis| low_m[axis] + share[axis] * (high_m[axis] - low_m[axis]));
     TRIED.into_iter().map(at).filter(|place_m| outline.holds(*place_m))
-}
-
-/// What gains and bows of the converters change in readings, of one standard deviation each (V): a column each.
-fn converter_patterns_v(detector: &Detector, readings: &Readings) -> DMatrix<f64> {
-    let n = readings.electrodes();
-    let mut patterns_v = DMatrix::zeros(n * n, 2 * detector.converters.len());
-    for (g, e) in (0..n).flat_map(|g| (0..n).map(move |e| (g, e))) {
-        let index = detector.electrodes[e].converter;
-        let Some(converter) = detector.converters.get(index) else { continue };
-        let changes_v = converter.changes_v(readings.at(g, e));
-        (0..2).for_each(|kind| patterns_v[(g * n + e, 2 * index + kind)] = changes_v[kind]);
-    }
-    patterns_v
 }
