@@ -188,3 +188,6 @@ impl Talk<'_> {
         Ok(None)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -234,7 +234,8 @@ fn a_key_that_was_missed_is_not_taken_for_the_one_of_the_same_number_before() {
     let mut sender = Sender::default();
     let send = |sender: &mut Sender, number: u32, reading: u16| {
         let head = FrameHead { sequence: number as u16, time_us: 70 * number, ..FrameHead::default() };
-        let frame = Frame { head, scope: Scope::whole(4).unwrap(), readings: Fixed::from_slice(&[reading; 16]).unwrap() };
+        let frame =
+            Frame { head, scope: Scope::whole(4).unwrap(), readings: Fixed::from_slice(&[reading; 16]).unwrap() };
         sender.send(&frame).0
     };
     let mut receiver = BoardReceiver::default();
@@ -243,7 +244,8 @@ fn a_key_that_was_missed_is_not_taken_for_the_one_of_the_same_number_before() {
     (1..=65_536).for_each(|number| _ = send(&mut sender, number, 5006));
     assert_eq!(take(send(&mut sender, 65_537, 5006)), Err(DecodeError::Key));
     let later: Vec<_> = (65_538..65_580).map(|number| take(send(&mut sender, number, 5006))).collect();
-    let right = |result: &Result<_, _>| matches!(result, Ok(BoardMessage::Frame(frame)) if frame.readings == [5006; 16]);
+    let right =
+        |result: &Result<_, _>| matches!(result, Ok(BoardMessage::Frame(frame)) if frame.readings == [5006; 16]);
     assert!(later.iter().all(|result| right(result) || *result == Err(DecodeError::Key)));
     assert!(right(&later[40]), "and goes on from the next key");
 }

@@ -2,8 +2,8 @@
 
 use tactomo_protocol::{
     BoardMessage, Command, ContactCode, ContactFlags, Contacts, Counters, DecodeError, EncodeError, Fault, Frame,
-    FrameHead, Hello, MAX_COMMAND, MAX_WIRE, OLDEST, Plan, Range, Request, Scope, Settings, Status, VERSION, encode_board, encode_frame, encode_log, encode_request,
-    encode_rows, wire_bytes,
+    FrameHead, Hello, MAX_COMMAND, MAX_WIRE, OLDEST, Plan, Range, Request, Scope, Settings, Status, VERSION,
+    encode_board, encode_frame, encode_log, encode_request, encode_rows, wire_bytes,
 };
 
 use crate::common::{board_wire, hello, packet, receive_board, receive_command, request_wire};
@@ -46,11 +46,8 @@ fn of_the_version_before_a_host_takes_all_but_coded_frames() {
         let packet = cobs::decode_vec(&stuffed[..stuffed.len() - 1]).unwrap();
         board_result(version << 4 | packet[0] & 15, &packet[1..packet.len() - 4])
     };
-    let frame = Frame {
-        head: FrameHead::default(),
-        scope: Scope::whole(4).unwrap(),
-        readings: [7; 16].into_iter().collect(),
-    };
+    let frame =
+        Frame { head: FrameHead::default(), scope: Scope::whole(4).unwrap(), readings: [7; 16].into_iter().collect() };
     let messages =
         [BoardMessage::Hello(hello()), BoardMessage::Frame(frame.clone()), BoardMessage::Fault(Fault::AdcStuck)];
     for message in &messages {
@@ -85,7 +82,10 @@ fn contacts_are_as_many_as_are_counted_and_have_numbers() {
                 continue;
             }
             let Ok(BoardMessage::Contacts(contacts)) = result else { panic!("{last:#x}: {result:?}") };
-            assert_eq!(contacts.found.iter().map(|contact| contact.id).collect::<Vec<_>>(), whole[8..].iter().step_by(8).take(contacts.found.len()).copied().collect::<Vec<_>>());
+            assert_eq!(
+                contacts.found.iter().map(|contact| contact.id).collect::<Vec<_>>(),
+                whole[8..].iter().step_by(8).take(contacts.found.len()).copied().collect::<Vec<_>>()
+            );
             assert_eq!((contacts.head.sequence, contacts.head.fraction_bits), (9, 0));
             let sent = board_wire(&BoardMessage::Contacts(contacts));
             assert_eq!(sent, packet(CONTACTS, &whole[..length]), "it goes out as it came");
@@ -412,7 +412,6 @@ fn a_stretch_that_is_too_long_is_junk_though_its_beginning_is_a_packet() {
         received.extend(std::iter::from_fn(|| receiver.receive(&mut chunk)));
     }
     assert_eq!(received, [Err(DecodeError::Corrupt), Ok(request)]);
-    let expected =
-        Counters { messages: 1, corrupt: 1, dropped_bytes: stream.len() as u64, ..Counters::default() };
+    let expected = Counters { messages: 1, corrupt: 1, dropped_bytes: stream.len() as u64, ..Counters::default() };
     assert_eq!(receiver.counters(), expected);
 }

@@ -93,11 +93,7 @@ impl Last {
 
 /// Which of `sent` arrived whole, and what the rest is counted as. A plain reading of the framing rule: whatever stands
 /// between two zeros is a packet that was sent, byte for byte, or junk.
-fn whole<M: Clone>(
-    sent: &[(M, Vec<u8>)],
-    stream: &[u8],
-    mut is_again: impl FnMut(&M) -> bool,
-) -> (Vec<M>, Counters) {
+fn whole<M: Clone>(sent: &[(M, Vec<u8>)], stream: &[u8], mut is_again: impl FnMut(&M) -> bool) -> (Vec<M>, Counters) {
     let (mut arrived, mut counters) = (Vec::new(), Counters::default());
     let mut stretches: Vec<&[u8]> = stream.split(|byte| *byte == 0).collect();
     stretches.pop(); // Still open.

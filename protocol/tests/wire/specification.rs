@@ -51,11 +51,7 @@ fn board_messages() -> Vec<BoardMessage> {
         ),
         frame(timed_out, Scope::whole(4), &[65535, 256, 0, 1, 255, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
         frame(numbered(0), Scope::whole(4), &[0; 16]),
-        frame(
-            numbered(1),
-            Scope::of_rows(16, &[12, 0, 12], 0b1001_0000_0000_0001),
-            &[3, 0, 450, 0, 7, 440, 2, 0, 451],
-        ),
+        frame(numbered(1), Scope::of_rows(16, &[12, 0, 12], 0b1001_0000_0000_0001), &[3, 0, 450, 0, 7, 440, 2, 0, 451]),
         BoardMessage::Log(Log(Fixed::from_slice(&[0xFF, 0x00, 0x12, 0x00]).unwrap())),
         BoardMessage::Fault(Fault::Panic("src/main.rs:42".try_into().unwrap())),
         BoardMessage::Fault(Fault::Reset("watchdog".try_into().unwrap())),

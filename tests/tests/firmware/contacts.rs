@@ -4,12 +4,15 @@ use std::sync::LazyLock;
 
 use tactomo::detector::Detector;
 use tactomo::solve::{Problem, compile};
+use tactomo_firmware::Identity;
 use tactomo_protocol::{
-    BoardMessage, Command, ContactFlags, Contacts, Fault, MAX_PIECE, Output, TablePiece, TableState,
+    BoardMessage, Command, ContactFlags, Contacts, Fault, MAX_PIECE, Output, Range, TablePiece, TableState,
 };
 
-use crate::bench::{Bench, DETECTOR, ROOM, TABLE, faulty_simulation, finder, finger, simulation, table_memory};
-use crate::parts::{Outside, simple_board, step};
+use crate::bench::{
+    Bench, DETECTOR, ROOM, TABLE, faulty_simulation, finder, finger, memory_of, simulated_on, simulation, table_memory,
+};
+use crate::parts::{IDENTITY, Outside, simple_board, step};
 
 #[test]
 fn contacts_are_where_something_presses_and_follow_a_rest_that_is_known() {
@@ -154,6 +157,50 @@ fn tables_that_are_damaged_or_of_another_detector_are_refused() {
             assert_eq!(state.usable, None);
         }
         assert!(was_refused);
+    }
+}
+
+/// Other electrode counts, a ground that is lifted, and a converter that sees nothing below a floor: with the ground above it a light press is read, and what
+/// is at the floor is no voltage, nor a rest.
+#[test]
+fn boards_of_any_electrodes_grounds_and_floors_find_what_presses_where_it_is() {
+    let floor_mv = 142u16;
+    let floor = Range { floor: (f64::from(floor_mv) / 3300.0 * 4096.0) as u16, ..Range::of_codes(16, 12) };
+    let floored = IDENTITY.adc.with_ranges(&[floor]);
+    let place_m = [0.008, -0.006];
+    // Electrodes that are left out, how far the ground is lifted, and the converter.
+    for (left_out, ground_v, adc) in [
+        (&[][..], 0.25, IDENTITY.adc),
+        (&[], 0.25, floored),
+        (&[], 0.0, floored),
+        (&[0, 5, 10, 15], 0.0, IDENTITY.adc),
+        (&[1, 2, 7, 8, 11, 13, 14], 0.25, floored),
+    ] {
+        let mut detector = DETECTOR.clone();
+        let mut number = 0;
+        detector.electrodes.retain(|_| {
+            number += 1;
+            !left_out.contains(&(number - 1))
+        });
+        let electrodes = detector.electrodes.len() as u8;
+        let drive_mv = 2000 + (1000.0 * ground_v) as u16;
+        let identity = Identity { electrodes, adc, drive_mv, ..IDENTITY };
+        let table = compile(&Problem::of(&detector).unwrap()).unwrap();
+        let mut bench = Bench::of(finder(memory_of(&table)), identity, ground_v);
+        bench.command(Command::Output(Output::Contacts));
+        bench.command(Command::Start);
+        let described = format!("{electrodes} electrodes, {ground_v} V, {:?}", adc.ranges[0]);
+        let resting = bench.scan(&mut simulated_on(&detector, &[], &[]), 80);
+        assert!(resting.iter().all(|contacts| contacts.found.is_empty()), "{described}");
+        assert!(!resting.last().unwrap().flags.has(ContactFlags::RESTING), "{described}");
+        let pressed = bench.scan(&mut simulated_on(&detector, &[finger(place_m)], &[]), 12);
+        let [contact] = pressed.last().unwrap().found[..] else { panic!("{described}: {:?}", pressed.last()) };
+        let off_m = contact.at_m().map(f64::from);
+        assert!((off_m[0] - place_m[0]).hypot(off_m[1] - place_m[1]) < 5e-4, "{described}: {contact:?}");
+        let after = bench.scan(&mut simulated_on(&detector, &[], &[]), 6);
+        // Where all readings are at the floor, none tells that a light contact has gone.
+        let is_seen = ground_v > 0.0 || adc.ranges[0].floor == 0;
+        assert!(!is_seen || after.last().unwrap().found.is_empty(), "{described}: {:?}", after.last());
     }
 }
 

@@ -140,7 +140,7 @@ fn tables_come_and_stay<const WORD: usize, const SECTOR: usize>() {
     assert_eq!(usable(&reset(&mut chip)), checksum(&FIRST));
     let sectors = FIRST.len().div_ceil(SECTOR);
     let worn = [vec![1; sectors], vec![0; ROOM / SECTOR - sectors]].concat();
-    assert_eq!(BASES.map(|base| chip.erased(base)), [vec![0; ROOM / SECTOR], worn]);
+    assert_eq!(BASES.map(|base| chip.erased(base)), [worn, vec![0; ROOM / SECTOR]]);
 
     let operations = chip.operations;
     assert_eq!(send(&mut reset(&mut chip), &FIRST, whole), Some(1));
@@ -217,7 +217,9 @@ fn a_table_too_long_and_a_region_that_is_none_are_refused() {
     }
     let mut store = store(&mut chip, ROOM);
     assert!(!store.write(ROOM - 4, &[1; 8]) && !store.write(usize::MAX, &[1; 8]));
-    for bases in [[BASES[0], BASES[1] + 64], [BASES[0] + 64, BASES[1]], BASES.map(|_| ROOM), [END, ROOM], [ROOM, ROOM + 4096]] {
+    for bases in
+        [[BASES[0], BASES[1] + 64], [BASES[0] + 64, BASES[1]], BASES.map(|_| ROOM), [END, ROOM], [ROOM, ROOM + 4096]]
+    {
         let mut none = FlashStore::new(&mut chip, RamCopy::new(vec![0; ROOM]), bases.map(|base| base as u32));
         assert!(none.bytes().is_empty() && !none.write(0, &[1; 8]) && !none.swap(), "{bases:x?}");
     }

@@ -130,12 +130,13 @@ impl<const WORD: usize, const SECTOR: usize> NorFlash for Chip<WORD, SECTOR> {
         assert!(self.is_off || clears || blank.iter().all(|blank| *blank), "written twice, or not erased");
         blank.fill(false);
         let was_off = self.is_off;
-        let weak = bytes.iter().position(|byte| *byte != 0xFF);
+        // The first byte of which a bit is to be cleared.
+        let weak = bytes.iter().zip(&self.bytes[at..end]).position(|(byte, place)| place & !byte != 0);
         let trouble = self.trouble(weak.is_some());
         for (number, (place, byte)) in self.bytes[at..end].iter_mut().zip(bytes).enumerate() {
             match trouble {
                 None => *place &= byte,
-                Some(Trouble::Weak) if Some(number) == weak => *place &= byte | 1 << byte.trailing_ones(),
+                Some(Trouble::Weak) if Some(number) == weak => *place &= byte | 1 << (*place & !byte).trailing_zeros(),
                 Some(Trouble::Weak) => *place &= byte,
                 Some(_) if !was_off => *place &= byte | self.random.u8(..),
                 Some(_) => {}

@@ -135,7 +135,9 @@ fn places(text: &str, before: &str) -> [u32; 2] {
 fn tables_lie_where_no_image_reaches() {
     let espressif = places(ESPRESSIF_TABLE, "const TABLES_AT: [u32; 2] = [");
     assert_eq!(espressif[1], 0x1_0000 + address(IMAGES, "const ESP_FLASH: u64 = "), "behind the longest image");
-    assert!(FIRMWARE_PAGE.contains(&format!("| {:#08X} and {:#08X} of the module's flash", espressif[0], espressif[1])));
+    assert!(
+        FIRMWARE_PAGE.contains(&format!("| {:#08X} and {:#08X} of the module's flash", espressif[0], espressif[1]))
+    );
     let stm32 = places(STM32_FLASH, "const SECTORS_AT: [u32; 2] = [");
     assert!(IMAGES.contains("0x0800_0000..0x080c_0000") && stm32 == [0xE_0000, 0xC_0000]);
     assert!(STM32_MEMORY.contains("LENGTH = 1024K - 256K") && stm32[1] == (1024 - 256) * 1024);
