@@ -24,7 +24,7 @@ use tactomo_cli::output::{self, NewFile, message};
 /// with that of guessing the middle of all presses each time; where it is no better, it says so.
 ///
 /// Examples:
-///   tactomo-lab learn presses.csv --out skin.safetensors
+///   tactomo-lab learn presses.csv --out sensor.safetensors
 ///   tactomo-lab learn presses.npz --detector my-cal.toml --out mine.safetensors --json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]

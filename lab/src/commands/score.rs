@@ -21,9 +21,9 @@ use tactomo_cli::output::{self, NewFile, command_line, message};
 /// have some, else in their order.
 ///
 /// Examples:
-///   tactomo-lab score skin.safetensors unseen.csv
-///   tactomo-lab score skin.safetensors unseen.csv --out score.html
-///   tactomo-lab score skin.safetensors unseen.npz --json
+///   tactomo-lab score sensor.safetensors unseen.csv
+///   tactomo-lab score sensor.safetensors unseen.csv --out score.html
+///   tactomo-lab score sensor.safetensors unseen.npz --json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {

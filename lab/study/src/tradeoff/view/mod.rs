@@ -12,7 +12,7 @@ const TWO: Format = PLAIN.digits(2);
 /// Charts of time against error, and every figure of every scene.
 pub fn view(report: &Report) -> View {
     let lead = "Each mark is a solver: further **left is faster**, further **down is more accurate**. Marks are medians over frames, and bars reach from the \
-                10th to the 90th percentile. What is cut out of a mark is the share of **wrong answers**. The dashed line joins the solvers that no other \
+                10th to the 90th percentile. The missing slice of a mark is the share of **wrong answers**. The dashed line joins the solvers that no other \
                 beats in both; what is behind it is paler. Small dots are the same solver with another value of its main parameter.";
     let mut view = View::new("Time against error", lead);
     view.method = format!(
