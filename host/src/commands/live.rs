@@ -4,6 +4,7 @@ mod several;
 pub mod skin;
 mod together;
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -23,7 +24,7 @@ use tactomo::run::table::{BoardTable, WithTable};
 use tactomo::scene::SceneName;
 use tactomo::sink::address::Address;
 use tactomo::sink::door::{Door, Origin};
-use tactomo::sink::page::{Finger, Listen, Server, Shown};
+use tactomo::sink::page::{Finger, Listen, Server, Shown, code};
 use tactomo::sink::place::Place;
 use tactomo::solve::{Method, Problem};
 
@@ -333,6 +334,7 @@ fn serve(picture: &PictureArgs, all: Vec<Shown>) -> anyhow::Result<Option<Server
     message!("live picture: {}", server.url());
     if let Some(url) = server.shared_url() {
         message!("on the network: {url}\nwho has this address can see the page and press its buttons");
+        message!("{}", code::lines(url, std::io::stderr().is_terminal()));
     }
     if !no_open {
         browser::open(&server.url());

@@ -334,7 +334,7 @@ fn only_a_shared_page_has_an_address_for_others() -> Result<()> {
     assert_eq!(Rig::start(None)?.server.shared_url(), None);
     let loopback = Listen { address: Some(Ipv4Addr::LOCALHOST.into()), port: Some(0), ..Listen::default() };
     let rig = Rig::listening(loopback, None)?;
-    assert_eq!(rig.server.shared_url(), Some(rig.server.url()));
+    assert_eq!(rig.server.shared_url(), Some(&*rig.server.url()));
     Ok(())
 }
 
