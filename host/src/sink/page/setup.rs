@@ -181,7 +181,7 @@ mod tests {
         let detector = Detector::read(file.as_ref()).expect("an example");
         let model = tactomo_physics::forward::Auto::new(&detector, None).expect("a model").model;
         let mesh = model.image_mesh().clone();
-        let value = json(message(&PageSetup { detector, mesh: mesh.clone(), ..small_setup() }, ("", None)));
+        let value = json(message(&PageSetup { detector, mesh: mesh.clone(), ..small_setup() }, ("", None), None));
         let count = |name: &str| value[name].as_array().map_or(0, Vec::len);
         assert_eq!(count("places_m"), mesh.nodes_m.len());
         assert_eq!(count("triangles") + count("torn_triangles"), mesh.triangles.len());
