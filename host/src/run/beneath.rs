@@ -18,9 +18,9 @@ pub struct Beneath {
 impl Beneath {
     /// Of the answer to readings as they are used, by a detector as its board measures it; `None` where something was found, or nothing hides.
     pub fn of(detector: &Detector, used: &Readings, solution: &Solution) -> Option<Self> {
-        let is_found =
-            !solution.contacts.is_empty() || solution.shape.is_some() || solution.image_s_per_m2.is_some();
-        let floor = |pad: &tactomo_physics::detector::Electrode| Some(detector.converters.get(pad.converter)?.range_v[0]);
+        let is_found = !solution.contacts.is_empty() || solution.shape.is_some() || solution.image_s_per_m2.is_some();
+        let floor =
+            |pad: &tactomo_physics::detector::Electrode| Some(detector.converters.get(pad.converter)?.range_v[0]);
         let floor_v = detector.electrodes.iter().filter_map(floor).fold(0.0, f64::max);
         if is_found || floor_v <= 0.0 {
             return None;
@@ -86,7 +86,11 @@ mod tests {
         assert_eq!(said(beneath(0.0, 0.142, &nothing)), Some(format!("nothing touches, or it is {lightly}")));
         assert_eq!(said(beneath(0.3, 0.142, &nothing)), Some(format!("something touches, {lightly}")));
         let broken = Solution { flags: Flags { excluded: vec![15], ..Flags::default() }, ..Solution::default() };
-        assert_eq!(beneath(2.0, 0.142, &broken).map(|beneath| beneath.is_pressed), Some(false), "a broken wire presses");
+        assert_eq!(
+            beneath(2.0, 0.142, &broken).map(|beneath| beneath.is_pressed),
+            Some(false),
+            "a broken wire presses"
+        );
         assert_eq!(beneath(0.0, 0.0, &nothing), None, "nothing hides");
         let found = Solution { contacts: vec![FoundContact::flat(0.0, 0.0, 1e-4)], ..Solution::default() };
         assert_eq!(beneath(0.3, 0.142, &found), None);

@@ -88,9 +88,7 @@ const NUMBERS: [Named<f32>; 14] = [
     named("pointer_pressed", |shown| pointer(shown, |state| f64::from(u8::from(state.is_pressed)))),
     named("pointer_clicks", |shown| pointer(shown, |state| state.clicks as f64)),
     named("floor_v", |shown| known(shown.answer.beneath.map(|beneath| beneath.floor_v))),
-    named("above_floor", |shown| {
-        known(shown.answer.beneath.map(|beneath| f64::from(u8::from(beneath.is_pressed))))
-    }),
+    named("above_floor", |shown| known(shown.answer.beneath.map(|beneath| f64::from(u8::from(beneath.is_pressed))))),
 ];
 
 /// The image: contact conductance per area at each node, none if the solver makes no image. The readings as measured, electrode `e` under ground
