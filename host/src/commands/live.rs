@@ -47,7 +47,7 @@ const PORT: &str = "Serial port of the board, or the serial number of its USB de
 /// Examples:
 ///   tactomo live                                    finds the board and serves the page
 ///   tactomo live --simulate                         without hardware
-///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
+///   tactomo live --simulate --scene five-fingers --force 10 --fault open:3
 ///   tactomo live --simulate --scene gripper         a demonstration, on the detector that it was made for
 ///   tactomo live --simulate --board esp32           at the pace and with the ADCs of the paper's board
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
