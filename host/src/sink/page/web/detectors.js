@@ -40,7 +40,7 @@ function tell() {
 }
 
 // What a tile has besides its picture, and between tiles (pixels): as the style sheet has it.
-const [HEAD, GAP] = [56, 12];
+const [HEAD, GAP] = [68, 12];
 const SMALLEST = 150;
 
 // As many columns as make the tiles largest without scrolling.

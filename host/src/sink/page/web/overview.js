@@ -11,7 +11,7 @@ import { Totals } from "./totals.js";
 import { write } from "./words.js";
 
 // About the colour bar: its names need room above and below (pixels).
-const BAR = { left: -10, top: 12, below: 26 };
+const BAR = { left: 4, top: 12, below: 26 };
 
 // What of several comes to, in newtons where those of all are known.
 function sumOf(totals) {
