@@ -16,7 +16,7 @@ use crate::states::STATES;
 /// Controls and headings that are seen, each with its place and its size (CSS pixels). What a person has opened beside them is none of them.
 const BOXES: &str = "const all = [...document.querySelectorAll('button, select, input, summary, label, h1, h2, th, dt, #choice, #sure, #plot, #image')];
     const seen = all.filter((e) => e.getClientRects().length && !e.closest('#calibrate-card, #notice, dialog, tbody, #figures'));
-    return Object.fromEntries(seen.map((e) => [`${e.tagName} ${e.id || e.closest('[id]').id} ${all.indexOf(e)}`,
+    return Object.fromEntries(seen.map((e) => [`${e.tagName} ${e.id || e.closest('[id]')?.id} ${all.indexOf(e)}`,
       (({ left, top, width, height }) => [left, top, width, height].map(Math.round))(e.getBoundingClientRect())]));";
 
 /// Elements whose words do not fit into them.
