@@ -125,7 +125,8 @@ fn nothing_changes_its_place_with_what_is_measured() -> Result<()> {
 #[test]
 fn calibrating_leaves_the_picture_and_its_buttons_where_they_are() -> Result<()> {
     // Cards that it does not need make room.
-    let boxes = BOXES.replace("#figures'", "#figures, #strip-card, #vibration-card, #readings-card, #details-card'");
+    let boxes =
+        BOXES.replace("#figures'", "#figures, #answer, #strip-card, #vibration-card, #readings-card, #details-card'");
     in_front_of(Script::start, async |stage| {
         for [width, height] in [[360, 740], [768, 1024], [1440, 900]] {
             stage.browser.resize(width, height).await?;
