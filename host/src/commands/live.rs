@@ -4,6 +4,7 @@ mod several;
 pub mod skin;
 mod together;
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -23,7 +24,7 @@ use tactomo::run::table::{BoardTable, WithTable};
 use tactomo::scene::SceneName;
 use tactomo::sink::address::Address;
 use tactomo::sink::door::{Door, Origin};
-use tactomo::sink::page::{Finger, Listen, Server, Shown};
+use tactomo::sink::page::{Finger, Listen, Server, Shown, code};
 use tactomo::sink::place::Place;
 use tactomo::solve::{Method, Problem};
 
@@ -46,7 +47,7 @@ const PORT: &str = "Serial port of the board, or the serial number of its USB de
 /// Examples:
 ///   tactomo live                                    finds the board and serves the page
 ///   tactomo live --simulate                         without hardware
-///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
+///   tactomo live --simulate --scene five-fingers --force 10 --fault open:3
 ///   tactomo live --simulate --scene gripper         a demonstration, on the detector that it was made for
 ///   tactomo live --simulate --board esp32           at the pace and with the ADCs of the paper's board
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
@@ -333,6 +334,7 @@ fn serve(picture: &PictureArgs, all: Vec<Shown>) -> anyhow::Result<Option<Server
     message!("live picture: {}", server.url());
     if let Some(url) = server.shared_url() {
         message!("on the network: {url}\nwho has this address can see the page and press its buttons");
+        message!("{}", code::lines(url, std::io::stderr().is_terminal()));
     }
     if !no_open {
         browser::open(&server.url());

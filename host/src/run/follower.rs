@@ -10,6 +10,7 @@ use tactomo_touch::solve::{Method, Parts};
 
 use super::Listener;
 use super::answers::Answers;
+use super::beneath::{Beneath, BeneathNotice};
 use super::calibration::Calibration;
 use super::event::TouchEvent;
 use super::inbox::{Event, Found, Inbox, Searched, Taken};
@@ -46,6 +47,7 @@ impl FollowThread {
             calibration: Calibration::new(ours(), Arc::clone(&notice), folder, learning),
             answers: Answers::new(notice, listeners),
             planner,
+            beneath: BeneathNotice::default(),
             answered: None,
         };
         let thread = thread::Builder::new().name("follower".to_owned());
@@ -73,6 +75,7 @@ struct FollowLoop {
     planner: Planner,
     /// Who is told.
     answers: Answers,
+    beneath: BeneathNotice,
     /// The frame that was answered last, for answers that come after it.
     answered: Option<Arc<TouchEvent>>,
 }
@@ -211,7 +214,11 @@ impl FollowLoop {
         let (method, conversions) = (self.solvers.method(), self.solvers.conversions());
         let Some(detector) = self.solvers.detector() else { return };
         let is_taking_baseline = detector.baseline.state().is_taking();
-        let event = self.answers.tell(TouchEvent { is_taking_baseline, ..event }, begun, came);
+        let beneath = Beneath::of(&detector.detector, &event.frame.used, &event.solution);
+        if let Some(beneath) = self.beneath.take(beneath, event.frame.board_time_us) {
+            tracing::info!("{beneath}");
+        }
+        let event = self.answers.tell(TouchEvent { is_taking_baseline, beneath, ..event }, begun, came);
         let solution = &event.solution;
         detector.watch.answered(solution);
         if !self.wires.is_looking()

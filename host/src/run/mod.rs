@@ -15,6 +15,7 @@
 //! ```
 
 mod answers;
+mod beneath;
 pub mod calibration;
 mod connection;
 pub mod course;
@@ -39,6 +40,7 @@ mod statistics;
 pub mod table;
 mod wires;
 
+pub use self::beneath::Beneath;
 pub use self::event::{Listener, TouchEvent};
 pub use self::found::solution as solution_of_board;
 pub use self::frame::{Arrival, Frame, NewestReadings};
