@@ -16,9 +16,9 @@ const LEAST_DAMPING: f32 = 1e-5;
 const DAMPING_STEP: f32 = 10.0;
 const TRIES: u8 = 4;
 /// Radii, as logarithms over the usual one: from a fifth of it to three times it.
-const LN_RADII: [f32; 2] = [-1.6, 1.1];
+pub(crate) const LN_RADII: [f32; 2] = [-1.6, 1.1];
 /// Resistances, as logarithms of those of a square of the layer: a contact of 1e-6 squares is nothing, and none leads better than a fifth of one.
-const LN_SQUARES: [f32; 2] = [-3.0, 13.8];
+pub(crate) const LN_SQUARES: [f32; 2] = [-3.0, 13.8];
 
 /// Contacts of a scene, [`MAX_CONTACTS`] at most.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
