@@ -31,12 +31,7 @@ impl<const READINGS: usize> Cells<READINGS> {
     }
 
     /// Takes a frame.
-    pub fn take(
-        &mut self,
-        table: &Table<'_>,
-        input: &Input,
-        (scanned, scope, readings): (&Scanned, &Scope, &[u16]),
-    ) {
+    pub fn take(&mut self, table: &Table<'_>, input: &Input, (scanned, scope, readings): (&Scanned, &Scope, &[u16])) {
         let (n, noise_v) = (table.electrodes(), table.head().noise_v);
         let ground_v = (input.drive_v - table.head().drive_v).max(0.0);
         for ((g, e), reading) in scope.cells().zip(readings) {
@@ -63,6 +58,12 @@ impl<const READINGS: usize> Cells<READINGS> {
     pub fn touch(&self, table: &Table<'_>) -> Option<Frame<'_>> {
         let readings = table.electrodes() * table.electrodes();
         Some(Frame::new(self.touch_v.get(..readings)?, self.says.get(..readings)?))
+    }
+
+    /// What touches of one cell (V).
+    #[cfg(test)]
+    pub fn touch_v(&self, cell: usize) -> f32 {
+        self.touch_v.get(cell).copied().unwrap_or(f32::NAN)
     }
 
     /// Whether readings at rest are known.

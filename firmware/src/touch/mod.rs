@@ -7,6 +7,8 @@ mod flash;
 mod input;
 mod rest;
 mod store;
+#[cfg(test)]
+mod tests;
 
 use tactomo_protocol::{Contacts, Hello, Output, Scope, TablePiece, TableState};
 

@@ -33,6 +33,8 @@ const IDENTITY: Identity = Identity {
 
 /// Scan from which something presses: by then readings at rest are known.
 const PRESSED_FROM: u32 = 80;
+/// Frames in which a search ends: 400 pieces, one after each of 16 rows.
+const SEARCH_FRAMES: u64 = 26;
 /// Frames that a measurement of contacts counts after the search.
 const FOLLOWED_FRAMES: u64 = 32;
 /// Frames that something presses a touch screen, and as many after that.
@@ -147,7 +149,10 @@ fn measure_contacts(board: &mut VirtBoard, gauge: &Gauge) -> ! {
     };
     frames(u64::from(PRESSED_FROM) - 1);
     let at_rest = frames(1);
-    let (landing, search, following) = (frames(1), frames(1), frames(FOLLOWED_FRAMES));
+    let landing = frames(1);
+    // A search goes on between rows: what it takes beside frames at rest. By then the longest has ended.
+    let search = (frames(SEARCH_FRAMES) * SEARCH_FRAMES).saturating_sub(at_rest * SEARCH_FRAMES);
+    let following = frames(FOLLOWED_FRAMES);
     Report(Uart::new()).line(&[
         ("instructions a frame at rest", at_rest),
         ("instructions a frame in which something lands", landing),
