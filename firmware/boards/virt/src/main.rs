@@ -150,13 +150,14 @@ fn measure_contacts(board: &mut VirtBoard, gauge: &Gauge) -> ! {
     frames(u64::from(PRESSED_FROM) - 1);
     let at_rest = frames(1);
     let landing = frames(1);
-    // A search goes on between rows: what it takes beside frames at rest. By then the longest has ended.
-    let search = (frames(SEARCH_FRAMES) * SEARCH_FRAMES).saturating_sub(at_rest * SEARCH_FRAMES);
+    // A search goes on between rows, and has ended by then.
+    let searched = frames(SEARCH_FRAMES);
     let following = frames(FOLLOWED_FRAMES);
+    let search = searched.saturating_sub(following) * SEARCH_FRAMES;
     Report(Uart::new()).line(&[
         ("instructions a frame at rest", at_rest),
         ("instructions a frame in which something lands", landing),
-        ("instructions a frame with a search", search),
+        ("instructions of a search beside frames that are followed", search),
         ("instructions a frame that is followed", following),
         ("stack bytes", gauge::stack_used_bytes() as u64),
         ("board bytes", size_of_val(board) as u64),
