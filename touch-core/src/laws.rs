@@ -147,26 +147,6 @@ fn readings_are_those_of_all_equations_solved_at_once() {
     }
 }
 
-/// A contact so light that it changes nothing carries what the potential under it drives.
-#[test]
-fn potentials_are_what_a_light_contact_carries() {
-    for (_, bytes) in tables() {
-        let table = Table::read(&bytes).unwrap();
-        let there = [spot(0.004, -0.009, 5.0), spot(-0.012, 0.006, 0.5)];
-        let light = Spot { ln_ohm: 1e8f32.ln(), ..spot(0.011, 0.007, 1.0) };
-        let (mut two, mut three) = (Circuit::EMPTY, Circuit::EMPTY);
-        assert!(two.solve(&table, &there) && three.solve(&table, &[there[0], there[1], light]));
-        let one = &three.loaded[2];
-        let (mut fields_ohm, mut found_ohm) = ([0.0; MAX_ELECTRODES], [0.0; MAX_ELECTRODES]);
-        fields_ohm.copy_from_slice(&one.sample.value[..MAX_ELECTRODES]);
-        two.potentials_ohm(&table, light.at_m, &fields_ohm, &mut found_ohm);
-        for e in 0..table.electrodes() {
-            let off = one.currents[e] * one.ohm - found_ohm[e];
-            assert!(off.abs() < 0.02 + 1e-3 * found_ohm[e].abs(), "{e}: {off} of {}", found_ohm[e]);
-        }
-    }
-}
-
 /// A perfect disc on a thick layer and on a thin one, and a light one, drive the moments that the module's page says.
 #[test]
 fn moments_are_those_of_discs_that_are_known() {

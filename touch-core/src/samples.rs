@@ -87,7 +87,7 @@ pub(crate) fn table_of(pads_m: &[[f32; 2]], mask: &[u8], change: impl Fn(&mut He
     let distances_ohm: Vec<_> =
         (0..KNOTS).map(|k| -OHM * ((k as f32 - 1.0) * head.ln_step + (head.near_m / 0.032).ln())).collect();
     // Of the fields and of the rest, twice.
-    let codes: Vec<_> = (0..n).map(|_| [0.0, 0.05]).chain([[100.0, 0.05], [0.5, 1.0 / 65_534.0]]).collect();
+    let codes: Vec<_> = (0..n).map(|_| [0.0, 0.05]).chain([[100.0, 0.01], [0.5, 1.0 / 65_534.0]]).collect();
     let mut coefficients = Vec::new();
     for j in 0..sides[1] {
         for i in 0..sides[0] {
