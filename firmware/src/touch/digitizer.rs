@@ -29,11 +29,14 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Digitizer<S, H, READIN
 
     /// Finds contacts if there is a table, and none of one that there is no more.
     fn begin(&mut self) {
-        if !self.finder.set_output(Output::Contacts) {
-            (self.bounds_m, self.output) = (None, Output::Frames);
-        } else if self.bounds_m.is_none() {
-            self.bounds_m = self.finder.bounds_m();
-            if let Some([low_m, high_m]) = self.bounds_m {
+        let had_table = self.bounds_m.is_some();
+        self.bounds_m = self.finder.bounds_m();
+        match self.bounds_m {
+            None => self.output = Output::Frames,
+            // Who is asked for the table's state goes on as it was.
+            Some(_) if had_table => {}
+            Some([low_m, high_m]) => {
+                self.finder.set_output(Output::Contacts);
                 self.sink.set_size([0, 1].map(|axis: usize| high_m[axis] - low_m[axis]));
             }
         }
@@ -110,5 +113,9 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Touch for Digitizer<S,
         let found = self.finder.contacts(scanned, scope, readings, attend);
         self.report(found.as_ref(), scanned.time_us);
         found.filter(|_| self.output.has_contacts())
+    }
+
+    fn go_on(&mut self, attend: &mut dyn FnMut()) {
+        self.finder.go_on(attend);
     }
 }

@@ -14,6 +14,10 @@ use crate::scan::Scanned;
 /// A table's drive may be above the board's by so much (V), as rounding to millivolts makes it; what it is below is how far the ground is lifted.
 const DRIVE_ROUNDING_V: f32 = 1e-3;
 
+/// Pieces of the work on a frame that are done at once: contacts that are followed rarely take more. What is left, most of a search, is done between rows, a piece each,
+/// while commands are obeyed and the scan goes on. Frames that come meanwhile are not looked at.
+const AT_ONCE: u32 = 6;
+
 /// Finds contacts by a table that it keeps in `S`, in frames of up to `READINGS` readings.
 #[derive(Debug)]
 pub struct ContactFinder<S, const READINGS: usize> {
@@ -29,6 +33,8 @@ pub struct ContactFinder<S, const READINGS: usize> {
     broken_wires: u32,
     last_broken: u32,
     told_broken: u32,
+    /// What was told last, if anything was.
+    told: Option<Contacts>,
 }
 
 impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
@@ -45,14 +51,14 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
             broken_wires: 0,
             last_broken: 0,
             told_broken: 0,
+            told: None,
         }
     }
 
     /// Lowest and highest corner of the detector (m), if there is a table of it.
     pub fn bounds_m(&self) -> Option<[[f32; 2]; 2]> {
         self.usable?;
-        let table = Table::read_again(self.store.bytes().get(..self.held)?).ok()?;
-        Some(table.bounds_m())
+        Some(table_in(&self.store, self.held)?.bounds_m())
     }
 
     /// The table in the store's first bytes, if it is sound and one of this board.
@@ -88,6 +94,23 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
         let Some(table) = self.sound(length) else { return self.refuse() };
         self.usable = Some(table);
         self.store.keep(length)
+    }
+
+    /// Does so many pieces of the work on a frame; `None` if there is nothing to work on.
+    fn work(&mut self, pieces: u32, attend: &mut dyn FnMut()) -> Option<()> {
+        let Self { store, held, solver, cells, .. } = self;
+        let table = table_in(store, *held)?;
+        let Some(answer) = solver.solve_in_pieces(&table, &cells.touch(&table)?, pieces, attend).ok()? else {
+            return Some(());
+        };
+        self.broken_wires = answer.left_out & self.last_broken;
+        self.last_broken = answer.left_out;
+        if cells.learn(&answer, &table) {
+            // What follows is above rest.
+            solver.reset();
+        }
+        self.told = Some(told(&answer));
+        Some(())
     }
 
     fn refuse(&mut self) -> bool {
@@ -130,6 +153,7 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
         self.solver.reset();
         self.cells.restart();
         self.told_broken = 0;
+        self.told = None;
     }
 
     fn take_broken_wires(&mut self) -> u32 {
@@ -145,26 +169,35 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
         readings: &[u16],
         attend: &mut dyn FnMut(),
     ) -> Option<Contacts> {
-        let Self { store, held, input, output, solver, cells, .. } = self;
-        if !output.has_contacts() {
+        if !self.output.has_contacts() {
             return None;
         }
-        // It was read, and checked, when it came.
-        let table = Table::read_again(store.bytes().get(..*held)?).ok()?;
-        let frame = cells.touch(&table, input, (scanned, scope, readings))?;
-        let answer = solver.solve_while(&table, &frame, attend).ok()?;
-        self.broken_wires = answer.left_out & self.last_broken;
-        self.last_broken = answer.left_out;
-        if cells.learn(&answer, &table) {
-            // What follows is above rest.
-            solver.reset();
+        if !self.solver.is_busy() {
+            let Self { store, held, input, cells, .. } = self;
+            cells.take(&table_in(store, *held)?, input, (scanned, scope, readings));
+            self.work(AT_ONCE, attend)?;
         }
-        let mut contacts = told(&answer);
-        if !cells.knows_rest() {
+        let nothing = || told(&Answer::default());
+        let mut contacts = self.told.clone().unwrap_or_else(nothing);
+        if self.solver.is_busy() {
+            contacts.flags.raise(ContactFlags::MISFIT);
+        }
+        if !self.cells.knows_rest() {
             contacts.flags.raise(ContactFlags::RESTING);
         }
         Some(contacts)
     }
+
+    fn go_on(&mut self, attend: &mut dyn FnMut()) {
+        if self.output.has_contacts() && self.solver.is_busy() {
+            let _ = self.work(1, attend);
+        }
+    }
+}
+
+/// The table in a store's first bytes: it was read, and checked, when it came.
+fn table_in(store: &impl TableStore, held: usize) -> Option<Table<'_>> {
+    Table::read_again(store.bytes().get(..held)?).ok()
 }
 
 /// An answer as it is sent.
