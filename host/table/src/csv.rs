@@ -147,11 +147,11 @@ impl<W: Write> CsvWriter<W> {
         self.writer.write_record(cells).map_err(io::Error::from)
     }
 
-    /// Ends it.
+    /// Writes what waits in memory.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(mut self) -> io::Result<()> {
+    pub fn flush(&mut self) -> io::Result<()> {
         self.writer.flush()
     }
 }
@@ -205,7 +205,7 @@ mod tests {
         let mut writer = CsvWriter::new(&mut bytes);
         writer.row(["a", "b"]).unwrap();
         writer.row(["1", "two, or \"three\""]).unwrap();
-        writer.finish().unwrap();
+        writer.flush().unwrap();
         assert_eq!(bytes, b"a,b\n1,\"two, or \"\"three\"\"\"\n");
         let mut writer = CsvWriter::new(Vec::new());
         writer.row(["a", "b"]).unwrap();
@@ -222,7 +222,7 @@ mod tests {
             for row in values[..whole].chunks(columns) {
                 writer.row(row.iter().map(f64::to_string)).unwrap();
             }
-            writer.finish().unwrap();
+            writer.flush().unwrap();
             let (names, rows) = parse(str::from_utf8(&bytes).unwrap()).unwrap();
             prop_assert!(names.is_empty());
             prop_assert_eq!(&rows.values[..], &values[..whole]);

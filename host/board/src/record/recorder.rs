@@ -1,6 +1,5 @@
 //! Keeps a recording while it is made, off the thread that receives.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,6 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use tactomo_physics::causes::with_causes;
+use tactomo_physics::new_file::{self, NewFileError};
 use tactomo_protocol::Hello;
 
 use super::packets::FirstPacket;
@@ -74,20 +74,28 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`] if the file cannot be written, or is there already: no recording is overwritten.
     pub fn create(path: &Path, header: &Header) -> Result<Self, RecordError> {
-        let open = |source| RecordError::Open { path: path.to_owned(), source };
         // The header tells the time at which its owner calls this.
         let began = Instant::now();
-        let writer = Self::file(path, header).map_err(open)?;
-        let mut recorder = Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)?;
+        let mut recorder = Self::begin(path, header, None)?;
         recorder.began = began;
         Ok(recorder)
     }
 
-    /// A new file with its header.
-    fn file(path: &Path, header: &Header) -> io::Result<RecordWriter<BufWriter<File>>> {
-        let mut writer = RecordWriter::new(BufWriter::new(File::create_new(path)?), header)?;
-        writer.flush()?;
-        Ok(writer)
+    /// Begins a new file with its header, and what the board says of itself; nothing is left of one that takes not even these.
+    fn begin(path: &Path, header: &Header, hello: Option<&Hello>) -> Result<Self, RecordError> {
+        let file = new_file::create(path)?;
+        let is_file = file.metadata().is_ok_and(|found| found.is_file());
+        let begun = RecordWriter::new(BufWriter::new(file), header).and_then(|mut writer| {
+            hello.map_or(Ok(()), |hello| writer.hello(hello))?;
+            writer.flush()?;
+            Self::start(path, writer, |file| new_file::sync(file.get_ref()), MAX_WAITING)
+        });
+        begun.map_err(|source| {
+            if is_file {
+                drop(std::fs::remove_file(path));
+            }
+            NewFileError::of(path, source).into()
+        })
     }
 
     /// Begins a recording in a new file while frames come from a board that has said `hello`. The recording begins with that, twice, so
@@ -101,10 +109,7 @@ impl Recorder {
 
     /// Begins a recording of bytes of which the first came at `began`, some time ago.
     pub(super) fn since(began: Instant, path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
-        let open = |source| RecordError::Open { path: path.to_owned(), source };
-        let mut writer = Self::file(path, header).map_err(open)?;
-        writer.hello(hello).map_err(open)?;
-        let mut recorder = Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)?;
+        let mut recorder = Self::begin(path, header, Some(hello))?;
         (recorder.began, recorder.first) = (began, FirstPacket::within());
         Ok(recorder)
     }
@@ -298,7 +303,7 @@ mod tests {
         recorder.finish().unwrap();
         assert_eq!(chunks(&path), [(1500, b"one".to_vec()), (1500, b"two".to_vec())], "times never fall");
         let again = Recorder::create(&path, &Header::default());
-        assert!(matches!(again, Err(RecordError::Open { .. })));
+        assert!(matches!(again, Err(RecordError::New(NewFileError::Exists { .. }))));
         std::fs::remove_file(path).unwrap();
     }
 
@@ -342,7 +347,7 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn a_full_disk_is_an_error() {
-        let full = File::create("/dev/full").unwrap();
+        let full = std::fs::File::create("/dev/full").unwrap();
         let writer = RecordWriter { out: BufWriter::new(full), chunk: Vec::new() };
         let mut recorder = Recorder::start(Path::new("full"), writer, |_| Ok(()), MAX_WAITING).unwrap();
         let error = loop {
