@@ -1,11 +1,13 @@
 //! Reading a command line: what is refused names the option, the value and what is needed, in plain words.
 
+use std::any::TypeId;
 use std::error::Error as _;
 use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use clap::builder::TypedValueParser;
+use clap::error::ErrorKind;
 use clap::{Arg, Command, FromArgMatches};
 use tactomo_physics::hertz::{FORCE_N, TIP_M};
 
@@ -15,6 +17,43 @@ use crate::output::message;
 pub fn read<T: FromArgMatches>(command: Command) -> T {
     let matches = taking_negative_numbers(command).try_get_matches();
     matches.and_then(|matches| T::from_arg_matches(&matches)).unwrap_or_else(|error| refuse(&error))
+}
+
+/// Options of a program that take numbers, but are refused one of them without saying what is needed: for the tests of programs.
+pub fn untold(command: Command) -> Vec<String> {
+    let command = taking_negative_numbers(command);
+    let all = of_numbers(&command, &[command.get_name().to_owned()]);
+    let tried = all
+        .iter()
+        .flat_map(|words| ["-1e308", "1e308", "nan", "0.5x"].map(|value| [&words[..], &[value.to_owned()]].concat()));
+    let is_told = |words: &Vec<String>| match command.clone().try_get_matches_from(words) {
+        Ok(_) => false,
+        Err(error) => {
+            let (told, libraries) = (told(&error), ["invalid digit", "invalid float", "number too"]);
+            error.kind() == ErrorKind::ValueValidation && !libraries.iter().any(|words| told.contains(words))
+        }
+    };
+    tried.filter(|words| !is_told(words)).map(|words| words.join(" ")).collect()
+}
+
+/// The options that take numbers, each as words of a command line.
+fn of_numbers(command: &Command, before: &[String]) -> Vec<Vec<String>> {
+    let numbers = [
+        TypeId::of::<f64>(),
+        TypeId::of::<u8>(),
+        TypeId::of::<u16>(),
+        TypeId::of::<u32>(),
+        TypeId::of::<u64>(),
+        TypeId::of::<usize>(),
+        TypeId::of::<Duration>(),
+    ];
+    let is_number = |arg: &&Arg| numbers.iter().any(|number| arg.get_value_parser().type_id() == *number);
+    let takes = |arg: &&Arg| arg.get_action().takes_values() && is_number(arg);
+    let option = |arg: &Arg| Some([before, &[format!("--{}", arg.get_long()?)]].concat());
+    let own = command.get_arguments().filter(takes).filter_map(option);
+    let subs =
+        command.get_subcommands().flat_map(|sub| of_numbers(sub, &[before, &[sub.get_name().to_owned()]].concat()));
+    own.chain(subs).collect()
 }
 
 /// The command, whose options take `-3` as a value: what is wrong with that is said of the value. Else the parser looks for an option of that name.
@@ -115,6 +154,17 @@ mod tests {
         let command = taking_negative_numbers(command());
         let matches = command.try_get_matches_from([&["it"], words].concat());
         told(&matches.expect_err("it is wrong"))
+    }
+
+    #[test]
+    fn options_that_do_not_say_what_is_needed_are_found() {
+        let share = ["nan", "1e308", "-1e308"].map(|value| format!("it --share {value}"));
+        let found = untold(command());
+        assert!(share.iter().all(|words| found.contains(words)), "{found:?}");
+        assert!(
+            !found.iter().any(|words| ["--force", "--nodes", "--seed"].iter().any(|name| words.contains(name))),
+            "{found:?}"
+        );
     }
 
     #[test]

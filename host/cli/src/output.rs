@@ -52,7 +52,8 @@ pub(crate) fn message_of(text: &str) -> String {
             return line.to_owned();
         }
         let (first, last) = (LONGEST_LINE * 2 / 3, LONGEST_LINE / 3);
-        let (begin, end): (String, String) = (line.chars().take(first).collect(), line.chars().skip(length - last).collect());
+        let (begin, end): (String, String) =
+            (line.chars().take(first).collect(), line.chars().skip(length - last).collect());
         format!("{begin} [... {} characters ...] {end}", length - first - last)
     };
     harmless(text).split('\n').map(cut).collect::<Vec<_>>().join("\n")
@@ -154,9 +155,12 @@ mod tests {
 
     #[test]
     fn a_message_leaves_out_the_middle_of_what_it_quotes() {
-        let told = message_of(&format!("line 1: {}: a number is needed\n{}\nshort", "x".repeat(3 << 20), " ".repeat(3 << 20)));
+        let told =
+            message_of(&format!("line 1: {}: a number is needed\n{}\nshort", "x".repeat(3 << 20), " ".repeat(3 << 20)));
         assert!(told.len() < 3 * LONGEST_LINE, "{}", told.len());
-        assert!(told.starts_with("line 1: xxx") && told.contains("xxx: a number is needed\n") && told.ends_with("\nshort"));
+        assert!(
+            told.starts_with("line 1: xxx") && told.contains("xxx: a number is needed\n") && told.ends_with("\nshort")
+        );
         assert!(told.contains("[... 3145254 characters ...]"), "{told}");
     }
 

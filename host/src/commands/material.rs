@@ -13,7 +13,7 @@ use super::calibrate::force::gather::{Gathered, gather};
 use super::calibrate::force::known::measured;
 use super::calibrate::force::report::{ReportedPress, scatter_line, siemens, three};
 use super::calibrate::write;
-use super::scene::elasticity;
+use super::scene::{elasticity, poisson};
 use tactomo_cli::options;
 use tactomo_cli::output::{self, NewFile, message};
 
@@ -60,7 +60,7 @@ struct FitArgs {
     #[arg(long, value_name = "MPA", value_parser = elasticity())]
     elasticity: Option<f64>,
     /// Poisson's ratio of the detector [default: that of its file, or 0.3]
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", value_parser = poisson())]
     poisson: Option<f64>,
     /// Writes the detector with this skin; a file that exists is not replaced
     #[arg(long, value_name = "FILE.toml")]
@@ -78,8 +78,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn fit(args: &FitArgs) -> anyhow::Result<()> {
-    let out =
-        args.out.as_deref().map(|path| Ok::<_, anyhow::Error>((path, NewFile::new(path)?))).transpose()?;
+    let out = args.out.as_deref().map(|path| Ok::<_, anyhow::Error>((path, NewFile::new(path)?))).transpose()?;
     let Gathered { detector, presses } = args.gathered()?;
     let own: Vec<ForcePress> = presses.iter().map(|press| press.press).collect();
     let fit = fit_skin(&own, args.tip(), &detector, args.skin(&detector)?)

@@ -105,6 +105,11 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_option_that_takes_a_number_says_what_is_needed() {
+        assert_eq!(tactomo_cli::options::untold(Cli::by_task()), [""; 0]);
+    }
+
+    #[test]
     fn help_lists_every_command_once() {
         let command = Cli::by_task();
         command.clone().debug_assert();

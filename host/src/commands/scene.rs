@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 use clap::builder::TypedValueParser;
 use tactomo::detector::Detector;
-use tactomo::hertz::{self, Hertz, Skin, Surface, YOUNG_PA};
+use tactomo::hertz::{self, Hertz, RATIO, Skin, Surface, YOUNG_PA};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
@@ -35,7 +35,7 @@ pub struct SceneArgs {
     #[arg(long, value_name = "MPA", value_parser = elasticity())]
     elasticity: Option<f64>,
     /// Poisson's ratio of the detector, for forces [default: that of its file, or 0.3]
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", value_parser = poisson())]
     poisson: Option<f64>,
     /// What the surface conducts under pressure, for forces: measured, a film as the detector's file has it or as in the paper's table II, or ideal, all that touches
     /// alike down to 0.5 mm or to the depth in ideal:MM [default: the file's law, or measured; demonstrations without --force press an ideal one, as the paper gives
@@ -192,6 +192,11 @@ pub fn read_touches(path: &Path) -> anyhow::Result<Vec<Touch>> {
         touch.check().with_context(|| format!("{}: touch {index}", path.display()))?;
     }
     Ok(touches)
+}
+
+/// Parses Poisson's ratio.
+pub fn poisson() -> impl TypedValueParser<Value = f64> {
+    options::number("a ratio", RATIO)
 }
 
 /// Parses Young's modulus (MPa).

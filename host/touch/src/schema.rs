@@ -211,12 +211,18 @@ pub const FRAME_COLUMNS: [FrameColumn; 19] = [
         name: "alternative_contacts",
         of: Of::Integer(|frame| frame.alternative.map(|other| other.contacts as u64)),
     },
-    FrameColumn { name: "alternative_certainty", of: Of::Number(|frame| frame.alternative.map(|other| other.certainty)) },
+    FrameColumn {
+        name: "alternative_certainty",
+        of: Of::Number(|frame| frame.alternative.map(|other| other.certainty)),
+    },
     FrameColumn { name: "saturated", of: Of::Flag(|frame| frame.flag(|flags| flags.saturated)) },
     FrameColumn { name: "misfit", of: Of::Flag(|frame| frame.flag(|flags| flags.misfit)) },
     FrameColumn { name: "unfinished", of: Of::Flag(|frame| frame.flag(|flags| flags.unfinished)) },
     FrameColumn { name: "calibrate", of: Of::Flag(|frame| frame.flag(|flags| flags.calibrate)) },
-    FrameColumn { name: "excluded_count", of: Of::Integer(|frame| frame.flags.map(|flags| flags.excluded.len() as u64)) },
+    FrameColumn {
+        name: "excluded_count",
+        of: Of::Integer(|frame| frame.flags.map(|flags| flags.excluded.len() as u64)),
+    },
 ];
 
 impl FrameColumn {

@@ -88,7 +88,9 @@ impl Case {
     /// Checks what can be checked before anything runs.
     pub fn check(&self) -> anyhow::Result<()> {
         let electrodes = self.described().electrodes.len();
-        self.scan.check(electrodes).map_err(|what| anyhow::anyhow!("--scan {}, scene {}: {what}", self.scan, self.scene))
+        self.scan
+            .check(electrodes)
+            .map_err(|what| anyhow::anyhow!("--scan {}, scene {}: {what}", self.scan, self.scene))
     }
 
     /// The detector that its scene was made for.

@@ -254,7 +254,8 @@ fn picture_and_data_are_saved() -> Result<()> {
               forceErrorN: 0.25, beyondMaximum: true, xErrorM: 0.5, yErrorM: 1, correlation: 0, depthM: null, areaM2: null };
             import('./save.js').then(({ csvOf }) => done(csvOf({ ...frame, contacts: [contact] }) + csvOf({ ...frame, contacts: [] })))";
         let csv = stage.browser.client.execute_async(script, Vec::new()).await?;
-        let rows: Vec<Vec<_>> = csv.as_str().unwrap_or_default().lines().map(|line| line.split(',').collect()).collect();
+        let rows: Vec<Vec<_>> =
+            csv.as_str().unwrap_or_default().lines().map(|line| line.split(',').collect()).collect();
         let [heads, touched, again, untouched] = &rows[..] else { bail!("{csv}") };
         // One table, whose columns are those of every output, but for the readings.
         let others = |head: &&&str| !csv_heads().contains(*head);

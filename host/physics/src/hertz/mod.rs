@@ -34,8 +34,8 @@ pub const FORCE_N: RangeInclusive<f64> = 1e-6..=1e4;
 pub const TIP_M: RangeInclusive<f64> = 1e-5..=1.0;
 /// Young's moduli (Pa): from a jelly's to a diamond's.
 pub const YOUNG_PA: RangeInclusive<f64> = 1e2..=1e12;
-/// Of stable solids above -1.
-const RATIO: RangeInclusive<f64> = -0.99..=0.5;
+/// Poisson's ratios: of stable solids above -1.
+pub const RATIO: RangeInclusive<f64> = -0.99..=0.5;
 const UNIT_PA: RangeInclusive<f64> = 1.0..=1e12;
 const DEPTH_M: RangeInclusive<f64> = 1e-9..=1.0;
 

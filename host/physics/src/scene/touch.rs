@@ -210,7 +210,10 @@ mod tests {
             (disc(0.0, 1e308, 1e-3), "radius_m is 1e308, but has to be from 1e-6 to 10.0"),
             (disc(0.0, 0.003, -1.0), "conductance_s is -1.0, but has to be from 1e-12 to 1000000.0"),
             (disc(0.0, 0.003, 1e308), "conductance_s is 1e308"),
-            (Touch::flat([0.0; 2], Shape::Line { length_m: 0.02, width_m: 0.0, angle_rad: 0.0 }, 1e-3), "width_m is 0.0"),
+            (
+                Touch::flat([0.0; 2], Shape::Line { length_m: 0.02, width_m: 0.0, angle_rad: 0.0 }, 1e-3),
+                "width_m is 0.0",
+            ),
         ] {
             let error = touch.check().unwrap_err().to_string();
             assert!(error.starts_with(told), "{error}");

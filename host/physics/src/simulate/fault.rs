@@ -218,7 +218,10 @@ fn deviation(text: &str) -> Result<f64, &'static str> {
 }
 
 fn positive(text: &str) -> Result<f64, &'static str> {
-    not_negative(text).ok().filter(|number| *number >= 1e-12).ok_or("a number above zero, from 1e-12 to 1e12, is needed")
+    not_negative(text)
+        .ok()
+        .filter(|number| *number >= 1e-12)
+        .ok_or("a number above zero, from 1e-12 to 1e12, is needed")
 }
 
 fn points(text: &str) -> Result<ConnectingPoints, &'static str> {
