@@ -5,7 +5,7 @@
 
 use std::io::{self, Write};
 
-use ::csv::{ReaderBuilder, StringRecord, Trim};
+use ::csv::{ErrorKind, ReaderBuilder, StringRecord, Trim};
 
 use super::Array;
 
@@ -144,7 +144,14 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// If it cannot be written, or is not as long as the rows before it.
     pub fn row<C: AsRef<[u8]>>(&mut self, cells: impl IntoIterator<Item = C>) -> io::Result<()> {
-        self.writer.write_record(cells).map_err(io::Error::from)
+        self.writer.write_record(cells).map_err(|error| {
+            let told = error.to_string();
+            match error.into_kind() {
+                // As the system says it: its kind tells what to do.
+                ErrorKind::Io(error) => error,
+                _ => io::Error::other(told),
+            }
+        })
     }
 
     /// Writes what waits in memory.
