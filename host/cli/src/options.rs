@@ -48,7 +48,8 @@ fn of_numbers(command: &Command, before: &[String]) -> Vec<Vec<String>> {
         TypeId::of::<Duration>(),
     ];
     let is_number = |arg: &&Arg| numbers.iter().any(|number| arg.get_value_parser().type_id() == *number);
-    let takes = |arg: &&Arg| arg.get_action().takes_values() && is_number(arg);
+    let has_value = |arg: &&Arg| arg.get_num_args().is_none_or(|count| count.takes_values());
+    let takes = |arg: &&Arg| arg.get_action().takes_values() && has_value(arg) && is_number(arg);
     let option = |arg: &Arg| Some([before, &[format!("--{}", arg.get_long()?)]].concat());
     let own = command.get_arguments().filter(takes).filter_map(option);
     let subs =
