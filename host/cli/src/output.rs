@@ -161,7 +161,7 @@ mod tests {
         assert!(
             told.starts_with("line 1: xxx") && told.contains("xxx: a number is needed\n") && told.ends_with("\nshort")
         );
-        assert!(told.contains("[... 3145254 characters ...]"), "{told}");
+        assert!(told.contains("[... 3145257 characters ...]"), "{told}");
     }
 
     #[test]
