@@ -213,6 +213,7 @@ mod tests {
         writer.row(["a", "b"]).unwrap();
         writer.row(["1", "two, or \"three\""]).unwrap();
         writer.flush().unwrap();
+        drop(writer);
         assert_eq!(bytes, b"a,b\n1,\"two, or \"\"three\"\"\"\n");
         let mut writer = CsvWriter::new(Vec::new());
         writer.row(["a", "b"]).unwrap();
@@ -230,6 +231,7 @@ mod tests {
                 writer.row(row.iter().map(f64::to_string)).unwrap();
             }
             writer.flush().unwrap();
+        drop(writer);
             let (names, rows) = parse(str::from_utf8(&bytes).unwrap()).unwrap();
             prop_assert!(names.is_empty());
             prop_assert_eq!(&rows.values[..], &values[..whole]);

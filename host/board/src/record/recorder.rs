@@ -124,8 +124,9 @@ impl Recorder {
         let (entries, queue) = channel();
         let waiting = Arc::new(AtomicUsize::new(0));
         let left = Arc::clone(&waiting);
-        let writer =
-            thread::Builder::new().name("recorder".to_owned()).spawn(move || keep(writer, &queue, &left, sync, kept))?;
+        let writer = thread::Builder::new()
+            .name("recorder".to_owned())
+            .spawn(move || keep(writer, &queue, &left, sync, kept))?;
         Ok(Self {
             path: path.to_owned(),
             began: Instant::now(),
@@ -380,7 +381,8 @@ mod tests {
     fn a_full_disk_is_an_error() {
         let full = std::fs::File::create("/dev/full").unwrap();
         let writer = RecordWriter { out: BufWriter::new(full), chunk: Vec::new() };
-        let mut recorder = Recorder::start(Path::new("full"), writer, |_| Ok(()), (MAX_WAITING, Kept::Something)).unwrap();
+        let mut recorder =
+            Recorder::start(Path::new("full"), writer, |_| Ok(()), (MAX_WAITING, Kept::Something)).unwrap();
         let error = loop {
             if let Err(error) = recorder.push(&[0; 10_000], Instant::now()) {
                 break error;
