@@ -231,7 +231,7 @@ mod tests {
                 writer.row(row.iter().map(f64::to_string)).unwrap();
             }
             writer.flush().unwrap();
-        drop(writer);
+            drop(writer);
             let (names, rows) = parse(str::from_utf8(&bytes).unwrap()).unwrap();
             prop_assert!(names.is_empty());
             prop_assert_eq!(&rows.values[..], &values[..whole]);
