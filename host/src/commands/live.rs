@@ -33,6 +33,7 @@ use super::source::{self, BoardArgs};
 use super::streams::StreamArgs;
 use super::{browser, keep};
 use tactomo_cli::choice::{DetectorArgs, Model};
+use tactomo_cli::options;
 use tactomo_cli::output::message;
 use tactomo_protocol::Output;
 
@@ -89,7 +90,7 @@ pub struct Args {
     #[arg(long, value_name = "WHAT", default_value = "frames", value_parser = output(), conflicts_with = "replay")]
     pub board_sends: Output,
     /// Ends this many seconds after the board said Hello
-    #[arg(long, value_parser = source::seconds)]
+    #[arg(long, value_parser = options::seconds)]
     pub seconds: Option<Duration>,
     /// Keeps all bytes that come in a new file; of several boards in a new folder, with a file for each, which --skin FOLDER shows again
     #[arg(long, value_name = "FILE")]

@@ -60,7 +60,7 @@ struct Report {
 
 /// Learns, and writes what was learned.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let out = NewFile::never_replacing(&args.out)?;
+    let out = NewFile::new(&args.out)?;
     let mut presses = Presses::read(&args.presses, &[])?;
     if let Some(chosen) = &args.detector {
         presses.drive_v = Some(drive_v(&chosen.get()?, presses.channels)?);

@@ -23,9 +23,9 @@ const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JacobianFileError {
-    /// The file cannot be read or written.
-    #[error("cannot read or write {}", path.display())]
-    Io {
+    /// The file cannot be read.
+    #[error("cannot read {}", path.display())]
+    Read {
         /// The file.
         path: PathBuf,
         /// What the system says.
@@ -61,17 +61,16 @@ pub enum JacobianFileError {
 }
 
 impl Jacobian {
-    /// Writes it to a file.
+    /// The content of its file.
     ///
     /// # Errors
-    /// [`JacobianFileError::Io`] if the file cannot be written.
-    pub fn save(&self, path: &Path) -> Result<(), JacobianFileError> {
-        let io = |source| JacobianFileError::Io { path: path.to_owned(), source };
+    /// If memory ends.
+    pub fn to_bytes(&self) -> io::Result<Vec<u8>> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(VERSION.to_le_bytes());
-        let mut bytes = postcard::to_extend(&Stored::from(self), bytes).map_err(|error| io(io::Error::other(error)))?;
+        let mut bytes = postcard::to_extend(&Stored::from(self), bytes).map_err(io::Error::other)?;
         bytes.extend(CHECKSUM.checksum(&bytes).to_le_bytes());
-        fs::write(path, bytes).map_err(io)
+        Ok(bytes)
     }
 
     /// Reads the file of a detector. Its name and its analogue-to-digital converter may differ: they change nothing here.
@@ -79,7 +78,7 @@ impl Jacobian {
     /// # Errors
     /// [`JacobianFileError`] if it is no whole file of this format or was made for another detector.
     pub fn load(path: &Path, detector: &Detector) -> Result<Self, JacobianFileError> {
-        let bytes = fs::read(path).map_err(|source| JacobianFileError::Io { path: path.to_owned(), source })?;
+        let bytes = fs::read(path).map_err(|source| JacobianFileError::Read { path: path.to_owned(), source })?;
         let jacobian = parse(&bytes, path)?;
         match difference(&jacobian.detector, detector) {
             Some(difference) => Err(JacobianFileError::OtherDetector { path: path.to_owned(), difference }),
@@ -199,7 +198,7 @@ mod tests {
     fn comes_back_as_it_was_and_only_for_its_detector() -> Result<(), Box<dyn std::error::Error>> {
         let path = std::env::temp_dir().join(format!("tactomo-{}.jacobian", std::process::id()));
         let saved = jacobian();
-        saved.save(&path)?;
+        fs::write(&path, saved.to_bytes()?)?;
         assert_eq!(Jacobian::load(&path, &saved.detector)?, saved);
         let mut other = saved.detector.clone();
         other.electrodes[3].x_m += 1e-5;
@@ -234,7 +233,7 @@ mod tests {
     #[test]
     fn damage_is_found() -> Result<(), Box<dyn std::error::Error>> {
         let path = std::env::temp_dir().join(format!("tactomo-damage-{}.jacobian", std::process::id()));
-        jacobian().save(&path)?;
+        fs::write(&path, jacobian().to_bytes()?)?;
         let whole = fs::read(&path)?;
         fs::remove_file(&path)?;
         let message = |bytes: &[u8]| parse(bytes, &path).map_or_else(|error| error.to_string(), |_| String::new());

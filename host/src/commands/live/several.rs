@@ -7,7 +7,7 @@ use anyhow::{Context, ensure};
 
 use super::Args;
 use super::skin::{self, Patch};
-use crate::commands::recording::folder::{EXTENSION, SKIN};
+use crate::commands::recording::folder::{self, EXTENSION, SKIN};
 use crate::commands::streams::StreamArgs;
 
 /// The detectors to show; `None` if it is one.
@@ -51,8 +51,7 @@ fn boards(args: &Args) -> anyhow::Result<Vec<Patch>> {
 
 /// Has each of them recorded in a folder, which can be shown again as it is.
 fn record(all: &mut [Patch], folder: &Path) -> anyhow::Result<()> {
-    fs::create_dir(folder)
-        .with_context(|| format!("cannot make the folder {} for the recordings of all", folder.display()))?;
+    folder::make(folder).context("the recordings of all go into a new folder")?;
     let mut skin = String::new();
     for Patch { name, place, args } in all.iter_mut().filter(|patch| patch.args.replay.is_none()) {
         let file = format!("{name}.{EXTENSION}");

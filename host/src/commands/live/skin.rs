@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use tactomo::causes::with_causes;
 use tactomo::sink::place::Place;
+use tactomo_cli::options;
 
 use super::Args;
 
@@ -187,7 +188,7 @@ fn is_file(option: &str, text: &str) -> bool {
 
 /// What a command line's parser says, in a line.
 fn said(error: &clap::Error) -> String {
-    let text = error.to_string();
+    let text = options::told(error);
     let lines =
         text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage") && !line.starts_with("For more"));
     let all: Vec<_> = lines.filter(|line| !line.is_empty()).collect();

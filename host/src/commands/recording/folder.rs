@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use tactomo::board::record::{RecordReader, edit};
+use tactomo::new_file::NewFileError;
 
 /// What a recording's file ends in.
 pub const EXTENSION: &str = "tactomo";
@@ -72,9 +73,17 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> anyhow::Result<Vec<PathBuf>> {
     joined.collect()
 }
 
+/// Makes a new folder.
+///
+/// # Errors
+/// As of a new file, if it is there already or cannot be made.
+pub fn make(folder: &Path) -> Result<(), NewFileError> {
+    fs::create_dir(folder).map_err(|source| NewFileError::of(folder, source))
+}
+
 /// Makes a folder for recordings that are shown together as those of `like` are.
 fn begin(like: &Path, out: &Path) -> anyhow::Result<()> {
-    fs::create_dir(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    make(out)?;
     let skin = like.join(SKIN);
     if skin.is_file() {
         let to = out.join(SKIN);
