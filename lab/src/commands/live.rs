@@ -146,7 +146,7 @@ fn view(runs: &[Found]) -> View {
         .column("age p99", US, |run| run.age_p99_us)
         .column("learned", seconds, |run| run.learned_s)
         .note(
-            "right: share of the time with as many contacts as touch, or the right shape; offline: where the same bytes are answered frame by frame. or named: and with an answer that names that number as one it may be. error: of places, median; late: in the last third. \
+            "right: share of the time with as many contacts as touch, none off by more than 15 % of the distance of electrodes, or the right shape; offline: where the same bytes are answered frame by frame. or named: and with an answer that names that number as one it may be. error: of places, median; late: in the last third. \
              invented, doubtful: shares of the answers. gap: longest time without an answer. learned: when what presses taught was first used.",
         )
         .data();

@@ -17,8 +17,8 @@ pub fn view(report: &Report) -> View {
     let mut view = View::new("Time against error", lead);
     view.method = format!(
         "Error: mean distance of contacts found from those that are there, where one missed or invented (none within the mean distance of \
-         electrodes) counts that distance: OSPA of order 1. An answer is wrong with a contact missed or invented, or if it was refused; an image, if it \
-         explains less than half of the truth's variance. The dotted line across is the median of normal errors with the covariance of the Cramer-Rao \
+         electrodes) counts that distance: OSPA of order 1. An answer is wrong with a contact missed, invented or off by more than 15 % of that distance, if it is \
+         of another kind than what touches, or was refused; an image, if it explains less than half of the truth's variance. The dotted line across is the median of normal errors with the covariance of the Cramer-Rao \
          bound, over the same frames: the converter's noise alone, the number of contacts known, radii known to a factor of two; for frames that follow, \
          from all frames until then. Correlation: of the image with the true conductance, both smoothed by a \
          thirtieth of the shorter side; of a solver without an image, its contacts are drawn as one. Readings come from a finer model than any that is \
