@@ -27,18 +27,12 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Digitizer<S, H, READIN
         Self { finder, sink, fingers: Fingers::NONE, bounds_m: None, output: Output::Frames }
     }
 
-    /// Finds contacts if there is a table, and none of one that there is no more.
+    /// Finds contacts by the table that there is, if there is one.
     fn begin(&mut self) {
-        let had_table = self.bounds_m.is_some();
-        self.bounds_m = self.finder.bounds_m();
-        match self.bounds_m {
-            None => self.output = Output::Frames,
-            // Who is asked for the table's state goes on as it was.
-            Some(_) if had_table => {}
-            Some([low_m, high_m]) => {
-                self.finder.set_output(Output::Contacts);
-                self.sink.set_size([0, 1].map(|axis: usize| high_m[axis] - low_m[axis]));
-            }
+        self.output = Output::Frames;
+        self.bounds_m = if self.finder.set_output(Output::Contacts) { self.finder.bounds_m() } else { None };
+        if let Some([low_m, high_m]) = self.bounds_m {
+            self.sink.set_size([0, 1].map(|axis: usize| high_m[axis] - low_m[axis]));
         }
     }
 
@@ -81,8 +75,12 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Touch for Digitizer<S,
     }
 
     fn take(&mut self, piece: &TablePiece) -> bool {
+        let before = self.finder.used();
         let fits = self.finder.take(piece);
-        self.begin();
+        // Else what touches goes on touching, and rest stays known.
+        if self.finder.used() != before {
+            self.begin();
+        }
         fits
     }
 

@@ -4,15 +4,13 @@ use tactomo_protocol::scope::Scope;
 use tactomo_protocol::{
     ContactCode, ContactFlags, Contacts, FrameHead, Hello, Output, TableId, TablePiece, TableState,
 };
-use tactomo_touch_core::{Answer, Contact, Flags, Solver, Table};
+use tactomo_touch_core::{Answer, Contact, Flags, Solver};
 
 use super::cells::Cells;
 use super::input::Input;
+use super::tables::Tables;
 use super::{TableStore, Touch};
 use crate::scan::Scanned;
-
-/// A table's drive may be above the board's by so much (V), as rounding to millivolts makes it; what it is below is how far the ground is lifted.
-const DRIVE_ROUNDING_V: f32 = 1e-3;
 
 /// Pieces of the work on a frame that are done at once: contacts that are followed rarely take more. What is left, most of a search, is done between rows, a piece each,
 /// while commands are obeyed and the scan goes on. Frames that come meanwhile are not looked at.
@@ -21,10 +19,7 @@ const AT_ONCE: u32 = 6;
 /// Finds contacts by a table that it keeps in `S`, in frames of up to `READINGS` readings.
 #[derive(Debug)]
 pub struct ContactFinder<S, const READINGS: usize> {
-    store: S,
-    /// Bytes of the table under way, or of the one in use.
-    held: usize,
-    usable: Option<TableId>,
+    tables: Tables<S, READINGS>,
     input: Input,
     output: Output,
     solver: Solver,
@@ -41,9 +36,7 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
     /// Uses the table that `store` has kept, if it has one of this board.
     pub const fn new(store: S) -> Self {
         Self {
-            store,
-            held: 0,
-            usable: None,
+            tables: Tables::new(store),
             input: Input::NONE,
             output: Output::Frames,
             solver: Solver::new(),
@@ -57,49 +50,18 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
 
     /// Lowest and highest corner of the detector (m), if there is a table of it.
     pub fn bounds_m(&self) -> Option<[[f32; 2]; 2]> {
-        self.usable?;
-        Some(table_in(&self.store, self.held)?.bounds_m())
+        self.tables.table().map(|table| table.bounds_m())
     }
 
-    /// The table in the store's first bytes, if it is sound and one of this board.
-    fn sound(&self, length: usize) -> Option<TableId> {
-        let bytes = self.store.bytes().get(..length)?;
-        let table = Table::read(bytes).ok()?;
-        let fits = table.electrodes() == usize::from(self.input.electrodes)
-            && table.electrodes() * table.electrodes() <= READINGS
-            && table.head().drive_v <= self.input.drive_v + DRIVE_ROUNDING_V;
-        let checksum = u32::from_le_bytes(*bytes.last_chunk()?);
-        fits.then_some(TableId { layout: table.layout(), checksum })
-    }
-
-    /// Begins a new table, or goes on with the one under way; returns whether it can become one.
-    fn write(&mut self, at: usize, bytes: &[u8]) -> bool {
-        if at == 0 {
-            (self.held, self.usable, self.output) = (0, None, Output::Frames);
-        }
-        // A piece that came twice, or after one that was lost: the state says where to go on.
-        if at != self.held || self.usable.is_some() {
-            return true;
-        }
-        let Some(held) = self.store.write(at, bytes) else { return false };
-        self.held = held;
-        match self.store.bytes().get(..held).and_then(Table::announced_bytes) {
-            Some(length) if length > self.store.bytes().len() || length < held => self.refuse(),
-            Some(length) if length == held => self.finish(length),
-            _ => true,
-        }
-    }
-
-    fn finish(&mut self, length: usize) -> bool {
-        let Some(table) = self.sound(length) else { return self.refuse() };
-        self.usable = Some(table);
-        self.store.keep(length)
+    /// Which table contacts are found by.
+    pub(super) fn used(&self) -> Option<TableId> {
+        self.tables.used()
     }
 
     /// Does so many pieces of the work on a frame; `None` if there is nothing to work on.
     fn work(&mut self, pieces: u32, attend: &mut dyn FnMut()) -> Option<()> {
-        let Self { store, held, solver, cells, .. } = self;
-        let table = table_in(store, *held)?;
+        let Self { tables, solver, cells, .. } = self;
+        let table = tables.table()?;
         let Some(answer) = solver.solve_in_pieces(&table, &cells.touch(&table)?, pieces, attend).ok()? else {
             return Some(());
         };
@@ -112,19 +74,12 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
         self.told = Some(told(&answer));
         Some(())
     }
-
-    fn refuse(&mut self) -> bool {
-        self.held = 0;
-        false
-    }
 }
 
 impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> {
     fn meet(&mut self, hello: &Hello) {
         self.input = Input::of(hello);
-        let length = Table::announced_bytes(self.store.bytes());
-        self.usable = length.and_then(|length| self.sound(length));
-        self.held = length.filter(|_| self.usable.is_some()).unwrap_or(0);
+        self.tables.look(&self.input);
     }
 
     fn output(&self) -> Output {
@@ -132,7 +87,7 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
     }
 
     fn set_output(&mut self, output: Output) -> bool {
-        let can = self.usable.is_some() || !output.has_contacts();
+        let can = self.used().is_some() || !output.has_contacts();
         if can {
             self.output = output;
             self.restart();
@@ -141,12 +96,18 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
     }
 
     fn take(&mut self, piece: &TablePiece) -> bool {
-        piece.bytes.is_empty() || self.write(piece.at as usize, &piece.bytes)
+        let before = self.used();
+        let fits = self.tables.take(piece, &self.input);
+        if self.used() != before {
+            // Contacts of the new one are asked for anew.
+            self.output = Output::Frames;
+            self.restart();
+        }
+        fits
     }
 
     fn table(&self) -> TableState {
-        let [room, held] = [self.store.bytes().len(), self.held].map(|bytes| bytes as u32);
-        TableState { answers: 0, room, held, usable: self.usable }
+        self.tables.state()
     }
 
     fn restart(&mut self) {
@@ -173,8 +134,8 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
             return None;
         }
         if !self.solver.is_busy() {
-            let Self { store, held, input, cells, .. } = self;
-            cells.take(&table_in(store, *held)?, input, (scanned, scope, readings));
+            let Self { tables, input, cells, .. } = self;
+            cells.take(&tables.table()?, input, (scanned, scope, readings));
             self.work(AT_ONCE, attend)?;
         }
         let nothing = || told(&Answer::default());
@@ -193,11 +154,6 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
             let _ = self.work(1, attend);
         }
     }
-}
-
-/// The table in a store's first bytes: it was read, and checked, when it came.
-fn table_in(store: &impl TableStore, held: usize) -> Option<Table<'_>> {
-    Table::read_again(store.bytes().get(..held)?).ok()
 }
 
 /// An answer as it is sent.

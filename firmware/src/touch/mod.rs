@@ -7,6 +7,7 @@ mod flash;
 mod input;
 mod rest;
 mod store;
+mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -29,7 +30,7 @@ pub trait Touch {
     /// Streams this from now on; returns whether it can. If not, it stays as it was. Contacts begin [anew](Self::restart) then, but for those that go elsewhere too.
     fn set_output(&mut self, output: Output) -> bool;
 
-    /// Takes a piece of a table; returns whether it can be part of one that fits the board.
+    /// Takes a piece of a table; returns whether it can be part of one that fits the board. The table before is used until the new one is whole.
     fn take(&mut self, piece: &TablePiece) -> bool;
 
     /// What there is of a table.

@@ -26,7 +26,8 @@ pub type Finder = ContactFinder<RamStore<Vec<u8>>, 256>;
 
 /// One whose memory has these bytes.
 pub fn finder(memory: Vec<u8>) -> Finder {
-    ContactFinder::new(RamStore::new(memory))
+    let other = vec![0; memory.len()];
+    ContactFinder::new(RamStore::new([memory, other]))
 }
 
 /// Memory with the detector's table.

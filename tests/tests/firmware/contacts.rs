@@ -1,5 +1,7 @@
 //! Contacts that a board finds by itself, and the table that it finds them by.
 
+use std::sync::LazyLock;
+
 use tactomo::detector::Detector;
 use tactomo::solve::{Problem, compile};
 use tactomo_protocol::{
@@ -151,10 +153,21 @@ fn without_a_table_contacts_are_refused_and_one_that_comes_in_pieces_is_used() {
     bench.command(Command::Output(Output::Contacts));
     bench.command(Command::Start);
     assert_eq!(bench.scan(&mut simulation(&[]), 4).len(), 4);
-    // A new table ends the contacts of the old one.
-    assert_eq!(bench.piece(0, &TABLE[..64]).0.usable, None);
+    // Contacts go on by the old one until a new one is whole, and are then to be asked for anew.
+    for (number, bytes) in OTHER.chunks(MAX_PIECE).enumerate() {
+        assert_eq!(bench.piece(number * MAX_PIECE, bytes).0.usable.is_some(), (number + 1) * MAX_PIECE >= OTHER.len());
+        if number % 400 == 0 {
+            assert_eq!(bench.scan(&mut simulation(&[]), 4).len(), 4);
+        }
+    }
     assert_eq!(bench.scan(&mut simulation(&[]), 4), []);
 }
+
+/// The detector's own, but for a drive that is a little lower.
+static OTHER: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let detector = Detector { drive_v: 1.99, ..DETECTOR.clone() };
+    compile(&Problem::of(&detector).unwrap()).unwrap()
+});
 
 #[test]
 fn tables_that_are_damaged_or_of_another_detector_are_refused() {

@@ -35,9 +35,9 @@ struct Chip {
 const XTENSA: (u16, &str) = (94, "Xtensa");
 const RISC_V: (u16, &str) = (243, "RISC-V");
 const ARM: (u16, &str) = (40, "ARM");
-/// Of 4 MB of flash behind espflash's boot loader and partition table (espflash 4: `factory` from 0x10000, 0x3f0000 long), without the last 128 kB, where the
-/// board keeps its table (`firmware/boards/espressif/src/table.rs`).
-const ESP_FLASH: u64 = 0x3d_0000;
+/// Of 4 MB of flash behind espflash's boot loader and partition table (espflash 4: `factory` from 0x10000, 0x3f0000 long), without the last 256 kB, where the
+/// board keeps its tables (`firmware/boards/espressif/src/table.rs`).
+const ESP_FLASH: u64 = 0x3b_0000;
 
 impl Chip {
     /// Addresses are those of esp-hal 1.2's `ld/CHIP/memory.x`, caches and parts kept for the boot loader included, and of our `memory.x`.
@@ -74,8 +74,8 @@ impl Chip {
             },
             Board::Stm32f405 => Self {
                 machine: ARM,
-                memories: &[0x0800_0000..0x080e_0000, 0x1000_0000..0x1001_0000, 0x2000_0000..0x2002_0000],
-                flash: 0xe_0000,
+                memories: &[0x0800_0000..0x080c_0000, 0x1000_0000..0x1001_0000, 0x2000_0000..0x2002_0000],
+                flash: 0xc_0000,
             },
         }
     }
