@@ -136,7 +136,10 @@ mod tests {
         let mut wires = WireLooks::new(Arc::new(Inbox::new(false)), Arc::clone(&notice), looks);
         let mut is_told_after = |time_s: f64, contacts: usize, misfit: bool| {
             let contacts = vec![FoundContact::flat(0.0, 0.0, 1e-4); contacts];
-            wires.answered(time_s, &Solution { contacts, flags: Flags { misfit, ..Flags::default() }, ..Solution::default() });
+            wires.answered(
+                time_s,
+                &Solution { contacts, flags: Flags { misfit, ..Flags::default() }, ..Solution::default() },
+            );
             notice.publish(|_| ());
             shown.borrow().wires.is_some()
         };
@@ -147,6 +150,9 @@ mod tests {
         assert!(is_told_after(11.3, 3, true), "two seconds since something touched");
         assert!(is_told_after(11.4, 0, false) && is_told_after(12.0, 1, true), "it is read while the hand is lifted");
         assert!(!is_told_after(12.5, 1, false), "the finger is found");
-        assert!(!is_told_after(20.0, 2, true) && !is_told_after(1.0, 2, true) && !is_told_after(2.0, 2, true), "back in a recording");
+        assert!(
+            !is_told_after(20.0, 2, true) && !is_told_after(1.0, 2, true) && !is_told_after(2.0, 2, true),
+            "back in a recording"
+        );
     }
 }
