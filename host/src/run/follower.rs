@@ -41,7 +41,7 @@ impl FollowThread {
         let (ours, learning) = (|| Arc::clone(inbox), solving.learning.take());
         let follow = FollowLoop {
             inbox: ours(),
-            wires: WireLooks::new(ours(), Arc::clone(&solving.look_at_wires)),
+            wires: WireLooks::new(ours(), Arc::clone(&notice), Arc::clone(&solving.look_at_wires)),
             solvers: Solvers::new(solving, ours(), Arc::clone(&notice)),
             search: SearchThread::start(ours())?,
             calibration: Calibration::new(ours(), Arc::clone(&notice), folder, learning),
@@ -221,6 +221,7 @@ impl FollowLoop {
         let event = self.answers.tell(TouchEvent { is_taking_baseline, beneath, ..event }, begun, came);
         let solution = &event.solution;
         detector.watch.answered(solution);
+        self.wires.answered(event.frame.time_s(), solution);
         if !self.wires.is_looking()
             && let Some(look) = detector.watch.look()
         {
