@@ -3,6 +3,7 @@
 //! Machine output and tables go to stdout, messages to stderr. Whoever reads them may have seen enough and close the pipe, as `head`
 //! does: that is no error, and nothing here panics of it.
 
+use std::cell::RefCell;
 use std::fmt::Arguments;
 use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, IsTerminal, Write};
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail, ensure};
+use tactomo_table::file::Unfinished;
 
 /// Prints a message on stderr, as `eprintln!` does, but without a panic where stderr is closed.
 #[macro_export]
@@ -107,8 +109,12 @@ fn bar(what: &str, done: u64, all: u64, elapsed: Duration) -> String {
 #[derive(Debug)]
 pub struct NewFile {
     path: PathBuf,
+    /// Whether it is a device or a pipe, which is written to and not replaced.
+    is_open: bool,
+    /// Whether it replaces a file of its name.
+    overwrite: bool,
     /// Where it is written until it is complete.
-    unfinished: PathBuf,
+    unfinished: RefCell<Option<Unfinished>>,
 }
 
 impl NewFile {
@@ -118,25 +124,22 @@ impl NewFile {
         if path.is_dir() {
             bail!("cannot write {}: it is a folder", path.display());
         }
-        // A device or a pipe is written to, not replaced.
-        if path.exists() && !path.is_file() {
-            return Ok(Self { unfinished: path.clone(), path });
-        }
-        if path.exists() && !overwrite {
+        let is_open = path.exists() && !path.is_file();
+        // A link that leads nowhere is there too.
+        if path.symlink_metadata().is_ok() && !overwrite && !is_open {
             bail!("{} exists already: give another name, or --overwrite to replace it", path.display());
         }
-        let mut unfinished = path.clone().into_os_string();
-        unfinished.push(".unfinished");
-        let file = Self { path, unfinished: unfinished.into() };
+        let file = Self { path, is_open, overwrite, unfinished: RefCell::default() };
         file.create()?;
         // Whoever is ended before there is anything to write leaves no empty file.
-        drop(std::fs::remove_file(&file.unfinished));
+        file.unfinished.take();
         Ok(file)
     }
 
     /// The same for a file of a kind that never replaces another one.
     pub fn never_replacing(path: &Path) -> anyhow::Result<Self> {
-        ensure!(!path.exists(), "{} exists already, and is not replaced: give another name", path.display());
+        let is_there = path.symlink_metadata().is_ok();
+        ensure!(!is_there, "{} exists already, and is not replaced: give another name", path.display());
         Self::new(path, false)
     }
 
@@ -152,24 +155,22 @@ impl NewFile {
         path.map(|path| Self::new(path, overwrite)).transpose()
     }
 
-    /// Where to write until it is complete.
-    pub fn unfinished_path(&self) -> &Path {
-        &self.unfinished
-    }
-
-    /// Opens it for writing.
+    /// Opens it for writing, from its beginning.
     pub fn create(&self) -> anyhow::Result<BufWriter<File>> {
-        let file = File::create(&self.unfinished).with_context(|| format!("cannot write {}", self.path.display()))?;
-        Ok(BufWriter::new(file))
+        let begun = match self.is_open {
+            true => File::options().write(true).open(&self.path),
+            false => Unfinished::beside(&self.path).map(|(unfinished, file)| {
+                self.unfinished.replace(Some(unfinished));
+                file
+            }),
+        };
+        Ok(BufWriter::new(begun.with_context(|| format!("cannot write {}", self.path.display()))?))
     }
 
     /// Gives it its name; it is complete.
     pub fn finish(self) -> anyhow::Result<()> {
-        if self.unfinished != self.path {
-            std::fs::rename(&self.unfinished, &self.path)
-                .with_context(|| format!("cannot write {}", self.path.display()))?;
-        }
-        Ok(())
+        let named = self.unfinished.take().map(|unfinished| unfinished.name(&self.path, self.overwrite));
+        named.unwrap_or(Ok(())).with_context(|| format!("cannot write {}", self.path.display()))
     }
 
     /// Writes all of it.
@@ -179,15 +180,6 @@ impl NewFile {
             .and_then(|()| out.flush())
             .with_context(|| format!("cannot write {}", self.path.display()))?;
         self.finish()
-    }
-}
-
-impl Drop for NewFile {
-    /// Leaves nothing of a file that was not completed.
-    fn drop(&mut self) {
-        if self.unfinished != self.path {
-            drop(std::fs::remove_file(&self.unfinished));
-        }
     }
 }
 
@@ -230,14 +222,27 @@ mod tests {
     #[test]
     fn a_file_that_is_not_completed_leaves_the_one_before_and_nothing_else() -> anyhow::Result<()> {
         let path = path("broken");
+        let foreign = path.with_extension("unfinished");
         std::fs::write(&path, "whole")?;
+        std::fs::write(&foreign, "another's")?;
         let file = NewFile::new(&path, true)?;
         file.create()?.write_all(b"half")?;
-        let unfinished = file.unfinished_path().to_owned();
-        assert!(unfinished.exists());
+        let ours = path.with_extension("unfinished-2");
+        assert!(ours.exists());
         drop(file);
-        assert!(!unfinished.exists());
+        assert!(!ours.exists());
         assert_eq!(std::fs::read_to_string(&path)?, "whole");
+        assert_eq!(std::fs::read_to_string(&foreign)?, "another's");
+        [path, foreign].iter().try_for_each(|path| Ok(std::fs::remove_file(path)?))
+    }
+
+    #[test]
+    fn a_file_that_came_meanwhile_stays() -> anyhow::Result<()> {
+        let path = path("meanwhile");
+        let file = NewFile::new(&path, false)?;
+        std::fs::write(&path, "another's")?;
+        assert!(file.write("ours").is_err());
+        assert_eq!(std::fs::read_to_string(&path)?, "another's");
         Ok(std::fs::remove_file(&path)?)
     }
 

@@ -96,8 +96,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let built = args.scene.as_built.of(&detector)?;
     let model = model(args, &built)?;
     if let (Some(file), Some(path)) = (jacobian, &args.save_jacobian) {
-        Jacobian::of(&*model).save(file.unfinished_path())?;
-        file.finish()?;
+        file.write(Jacobian::of(&*model).to_bytes()?)?;
         message!("saved the Jacobian of {} ({}) to {}", detector.name, model.name(), path.display());
     }
     if !computes {

@@ -12,10 +12,12 @@ use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Detector, ForceLaw};
 use tactomo_physics::forward::ForwardError;
 use tactomo_protocol::{Hello, TableId};
-use tactomo_touch::solve::{self, CompileError, FoundContact, Problem, compile};
+use tactomo_touch::solve::{self, CompileError, CompiledTable, FoundContact, Problem, compile};
 
 /// How long a board has to say Hello.
 const PATIENCE: Duration = Duration::from_secs(6);
+/// Drives differ by less where they are the same (V): a board's is told in whole millivolts.
+const SAME_DRIVE_V: f64 = 0.6e-3;
 
 /// A board that was given no table.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +41,22 @@ pub enum GiveTableError {
     /// The detector has no table.
     #[error(transparent)]
     Compile(#[from] CompileError),
+    /// The table of a file is of another detector.
+    #[error(
+        "{link}: the table is of {} electrodes and a drive of {:.3} V, and the board has {electrodes} electrodes and a drive of {drive_v:.3} V. \
+         Compile the detector that is connected",
+        table.electrodes, table.drive_v
+    )]
+    OtherDetector {
+        /// Name of the link.
+        link: String,
+        /// The table.
+        table: Box<CompiledTable>,
+        /// Electrodes of the board.
+        electrodes: usize,
+        /// Its drive (V).
+        drive_v: f64,
+    },
     /// The table was not taken.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -63,10 +81,18 @@ pub struct Given {
 /// [`GiveTableError`] if there is none, or the board does not take it.
 pub fn give(link: &mut dyn Link, what: &What, mut progress: impl FnMut(usize, usize)) -> Result<Given, GiveTableError> {
     let name = link.name();
-    let hello =
-        session::greet(link, Instant::now() + PATIENCE).map_err(|error| GiveTableError::Greet { link: name, error })?;
+    let hello = session::greet(link, Instant::now() + PATIENCE)
+        .map_err(|error| GiveTableError::Greet { link: name.clone(), error })?;
     let bytes = match what {
-        What::Table(bytes) => bytes.clone(),
+        What::Table(table) => {
+            let (electrodes, drive_v) = (hello.electrodes.into(), f64::from(hello.drive_mv) * 1e-3);
+            // A ground that is lifted takes some of the board's drive.
+            if table.electrodes != electrodes || table.drive_v > drive_v + SAME_DRIVE_V {
+                let table = Box::new(table.clone());
+                return Err(GiveTableError::OtherDetector { link: name, table, electrodes, drive_v });
+            }
+            table.bytes().to_vec()
+        }
         What::Detector(detector) => compile(&Problem::of(&measured::as_measured(detector, &hello)?)?)?,
     };
     let mut is_sent = false;
@@ -83,7 +109,7 @@ pub enum What {
     /// A detector, as the board measures it.
     Detector(Box<Detector>),
     /// A table that was compiled before.
-    Table(Vec<u8>),
+    Table(CompiledTable),
 }
 
 /// The table that a board was given last, for those who read what it finds.
