@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
+use tactomo_board::identity::Sensor;
 use tactomo_board::link::Link;
 use tactomo_board::measured::{self, Mismatch};
 use tactomo_board::session::{self, GreetError};
@@ -12,12 +13,13 @@ use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Detector, ForceLaw};
 use tactomo_physics::forward::ForwardError;
 use tactomo_protocol::{Hello, TableId};
+use super::calibration::Learning;
 use tactomo_touch::solve::{self, CompileError, CompiledTable, FoundContact, Problem, compile};
 
 /// How long a board has to say Hello.
 const PATIENCE: Duration = Duration::from_secs(6);
-/// Drives differ by less where they are the same (V): a board's is told in whole millivolts.
-const SAME_DRIVE_V: f64 = 0.6e-3;
+/// A table's drive may be above the board's by so much (V), as boards allow: theirs are told in whole millivolts.
+const SAME_DRIVE_V: f64 = 1e-3;
 
 /// A board that was given no table.
 #[derive(Debug, thiserror::Error)]
@@ -93,7 +95,13 @@ pub fn give(link: &mut dyn Link, what: &What, mut progress: impl FnMut(usize, us
             }
             table.bytes().to_vec()
         }
-        What::Detector(detector) => compile(&Problem::of(&measured::as_measured(detector, &hello)?)?)?,
+        What::Detector(detector) => compiled(detector, &hello)?,
+        What::Learned(learning) => {
+            let (kept, refused) = learning.kept(&Sensor::on(link, &hello));
+            refused.iter().for_each(|why| tracing::warn!("{why}"));
+            kept.iter().for_each(|kept| tracing::info!("the table is of what was learned before: {}", kept.file.display()));
+            compiled(kept.as_ref().map_or(&learning.description, |kept| &kept.detector), &hello)?
+        }
     };
     let mut is_sent = false;
     let table = table::send(link, &bytes, |at| {
@@ -103,11 +111,18 @@ pub fn give(link: &mut dyn Link, what: &What, mut progress: impl FnMut(usize, us
     Ok(Given { hello, bytes, table, is_sent })
 }
 
+/// The table of a detector as a board measures it.
+fn compiled(detector: &Detector, board: &Hello) -> Result<Vec<u8>, GiveTableError> {
+    Ok(compile(&Problem::of(&measured::as_measured(detector, board)?)?)?)
+}
+
 /// What a board is to find contacts by.
 #[derive(Clone, Debug)]
 pub enum What {
     /// A detector, as the board measures it.
     Detector(Box<Detector>),
+    /// What was learned before of the detector on this board, or else its description.
+    Learned(Box<Learning>),
     /// A table that was compiled before.
     Table(CompiledTable),
 }
@@ -156,9 +171,9 @@ pub struct WithTable {
 }
 
 impl WithTable {
-    /// A board on `source` that finds contacts on a detector; its table is put in `table`.
-    pub fn new(source: Box<dyn Source>, detector: Detector, table: BoardTable) -> Self {
-        Self { source, what: What::Detector(Box::new(detector)), table }
+    /// A board on `source` that finds contacts by `what`; its table is put in `table`.
+    pub fn new(source: Box<dyn Source>, what: What, table: BoardTable) -> Self {
+        Self { source, what, table }
     }
 }
 
