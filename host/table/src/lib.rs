@@ -15,8 +15,10 @@ use self::file::Format;
 pub use self::npy::Values;
 pub use self::npz::NpzWriter;
 
+/// Longest table that is read, in its file and unpacked (bytes).
+const LONGEST: u64 = 1 << 28;
 /// Tables are read whole.
-const FORMAT: Format = Format::new("a table that is read in one piece", 1 << 28);
+const FORMAT: Format = Format::new("a table", LONGEST);
 
 /// Numbers of some shape, the last axis running fastest.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -356,7 +356,7 @@ mod tests {
         type Change = fn(&mut Detector);
         let changes: [Change; 4] = [
             |detector| detector.electrodes[3].x_m += 1e-3,
-            |detector| detector.layers[0].conductivity_s_per_m *= 1.01,
+            |detector| detector.layers[0].top_s_per_m *= 1.01,
             |detector| detector.contact_impedance_ohm_m2 *= 2.0,
             |detector| detector.tolerances.electrodes_m *= 2.0,
         ];

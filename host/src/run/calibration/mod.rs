@@ -270,6 +270,38 @@ mod tests {
     }
 
     #[test]
+    fn what_was_learned_is_used_on_its_sensor_alone() {
+        let folder = std::env::temp_dir().join(format!("tactomo-met-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let sensor = |serial: &str| Sensor {
+            board: "test".to_owned(),
+            serial_number: Some(serial.to_owned()),
+            port: "COM3".to_owned(),
+        };
+        let described = Detector::default();
+        let keeping = Keeping::Beside { description: folder.join("mine.toml"), patch: String::new() };
+        let learning = Learning::of(&described, keeping).unwrap();
+        let calibration =
+            Calibrated { board: Some("test".to_owned()), place_error_m: Some(2e-4), ..Calibrated::default() };
+        let mut learned = Detector { calibration: Some(calibration), ..described.clone() };
+        learned.layers[0].thickness_m *= 1.1;
+        learning.keep(&learned, &sensor("A7")).unwrap();
+        let (snapshots, _receiver) = watch::channel(Arc::default());
+        let (inbox, notice) = (Arc::new(Inbox::new(false)), Arc::new(NoticeBoard::new(snapshots)));
+        let mut calibration = Calibration::new(inbox, notice, folder.clone(), Some(learning));
+        calibration.begin_with(Arc::new(described.clone()));
+        let thickness_m = |detector: &Detector| detector.layers[0].thickness_m;
+        for _ in 0..2 {
+            let Meeting::Known(used) = calibration.meet(sensor("A7")) else { panic!("it was learned") };
+            assert_eq!(thickness_m(&used), thickness_m(&learned));
+            assert!(matches!(calibration.meet(sensor("A7")), Meeting::AsBefore), "the board has come back");
+            let Meeting::Unknown(used) = calibration.meet(sensor("B8")) else { panic!("it is another") };
+            assert_eq!((thickness_m(&used), calibration.learned), (thickness_m(&described), None));
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
     fn one_calibration_at_a_time_is_shown_until_it_ends() {
         let (snapshots, receiver) = watch::channel(Arc::default());
         let notice = Arc::new(NoticeBoard::new(snapshots));
