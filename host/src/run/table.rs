@@ -13,8 +13,9 @@ use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Detector, ForceLaw};
 use tactomo_physics::forward::ForwardError;
 use tactomo_protocol::{Hello, TableId};
-use super::calibration::Learning;
 use tactomo_touch::solve::{self, CompileError, CompiledTable, FoundContact, Problem, compile};
+
+use super::calibration::Learning;
 
 /// How long a board has to say Hello.
 const PATIENCE: Duration = Duration::from_secs(6);
@@ -99,7 +100,8 @@ pub fn give(link: &mut dyn Link, what: &What, mut progress: impl FnMut(usize, us
         What::Learned(learning) => {
             let (kept, refused) = learning.kept(&Sensor::on(link, &hello));
             refused.iter().for_each(|why| tracing::warn!("{why}"));
-            kept.iter().for_each(|kept| tracing::info!("the table is of what was learned before: {}", kept.file.display()));
+            kept.iter()
+                .for_each(|kept| tracing::info!("the table is of what was learned before: {}", kept.file.display()));
             compiled(kept.as_ref().map_or(&learning.description, |kept| &kept.detector), &hello)?
         }
     };

@@ -80,6 +80,10 @@ mod tests {
         let serials = |ports: &[Port]| ["/dev/ttyUSB0", "/dev/ttyUSB1", "COM3"].map(|name| serial_of(name, ports));
         assert_eq!(serials(&ports()), [None, Some("0001".to_owned()), Some("A7".to_owned())]);
         let twice = [ports(), vec![port("/dev/ttyUSB2", Some("0001")), port("COM3", Some(""))]].concat();
-        assert_eq!(serials(&twice), [None, None, Some("A7".to_owned())], "two boards that say the same are not told apart");
+        assert_eq!(
+            serials(&twice),
+            [None, None, Some("A7".to_owned())],
+            "two boards that say the same are not told apart"
+        );
     }
 }

@@ -66,4 +66,3 @@ fn record(all: &mut [Patch], folder: &Path) -> anyhow::Result<()> {
     let path = folder.join(SKIN);
     fs::write(&path, skin).with_context(|| format!("cannot write {}", path.display()))
 }
-

@@ -174,7 +174,9 @@ fn placed(place: toml::Value) -> Result<Place, String> {
 /// The recording of a patch in a folder, as a word of a command line: whatever else it asks for is refused.
 fn of_recording(options: &toml::Table, folder: &Path) -> Result<Vec<String>, String> {
     if let Some(key) = options.keys().find(|key| *key != "replay") {
-        return Err(format!("{key:?} is not obeyed in a folder of recordings: there a patch has name, replay and place only"));
+        return Err(format!(
+            "{key:?} is not obeyed in a folder of recordings: there a patch has name, replay and place only"
+        ));
     }
     let name = options.get("replay").and_then(toml::Value::as_str);
     let name = name.ok_or("it needs replay, the name of a recording in the folder")?;
@@ -311,7 +313,7 @@ mod tests {
         for key in keys.chain(["port_", "listen=0.0.0.0:7999"]) {
             for value in ["true", "false", "\"a\"", "1", "[\"a\"]"] {
                 let refused = read(&format!("replay = \"thumb.tactomo\"\n{key:?} = {value}")).err().unwrap();
-                assert!(refused.contains(&format!("patch thumb of ")) && refused.contains(&format!("{key:?}")), "{refused}");
+                assert!(refused.contains("patch thumb of ") && refused.contains(&format!("{key:?}")), "{refused}");
             }
         }
         for name in ["../thumb.tactomo", "/dev/zero", "sub", "sub/a", "..", ".", "", "a\\\\b", "none.tactomo", "c:a"] {

@@ -77,7 +77,9 @@ impl Learning {
             match self.look(&file, sensor) {
                 Found::None => break,
                 Found::Its(detector) => return (Some(Kept { file, detector: *detector }), refused),
-                Found::Other(why) | Found::Unreadable(why) => refused.push(format!("{} is not used: {why}", file.display())),
+                Found::Other(why) | Found::Unreadable(why) => {
+                    refused.push(format!("{} is not used: {why}", file.display()))
+                }
             }
         }
         // What versions before kept says which kind of board it is of, and not which one: of several it might be any.
@@ -86,8 +88,12 @@ impl Learning {
             match self.look(&file, sensor) {
                 Found::Its(detector) if patch.is_empty() => return (Some(Kept { file, detector: *detector }), refused),
                 Found::None => {}
-                Found::Its(_) => refused.push(format!("{} is not used: it does not say of which board it is", file.display())),
-                Found::Other(why) | Found::Unreadable(why) => refused.push(format!("{} is not used: {why}", file.display())),
+                Found::Its(_) => {
+                    refused.push(format!("{} is not used: it does not say of which board it is", file.display()))
+                }
+                Found::Other(why) | Found::Unreadable(why) => {
+                    refused.push(format!("{} is not used: {why}", file.display()))
+                }
             }
         }
         (None, refused)
@@ -118,7 +124,9 @@ impl Learning {
         let learned = Detector { calibration: Some(calibration), ..learned.clone() };
         let mut refused = None;
         for file in self.files(sensor) {
-            let failed = |error: io::Error| format!("what was learned cannot be kept in {}: {}", file.display(), with_causes(&error));
+            let failed = |error: io::Error| {
+                format!("what was learned cannot be kept in {}: {}", file.display(), with_causes(&error))
+            };
             let is_its = match self.look(&file, sensor) {
                 Found::Its(_) => true,
                 Found::None => false,
@@ -167,14 +175,19 @@ impl Learning {
 
     /// What a file is to a sensor.
     fn look(&self, file: &Path, sensor: &Sensor) -> Found {
-        let detector = match self.read(file) {
+        let mut detector = match self.read(file) {
             Found::Its(detector) => detector,
             other => return other,
         };
-        let Calibration { sensor: of, board, .. } = detector.calibration.clone().unwrap_or_default();
+        // Whose it is concerns the file alone: recordings carry what is in use.
+        let calibration = detector.calibration.as_mut();
+        let told = calibration.map(|known| (known.sensor.take(), known.description.take(), known.board.clone()));
+        let (of, _, board) = told.unwrap_or_default();
         let (name, here) = (self.name(sensor), &sensor.board);
         match (of, board) {
-            (Some(of), _) if of != name => Found::Other(format!("it is of another sensor ({of}) than this one ({name})")),
+            (Some(of), _) if of != name => {
+                Found::Other(format!("it is of another sensor ({of}) than this one ({name})"))
+            }
             (_, Some(board)) if board != *here => {
                 Found::Other(format!("it was learned with another board ({board}) than this one ({here})"))
             }
@@ -349,7 +362,9 @@ mod tests {
             (Some(kept), _) => panic!("{kept:?}"),
         };
         let other_board = Sensor { board: "another".to_owned(), ..here.clone() };
-        assert!(refused(&bench.learning(""), &other_board).contains("with another board (test) than this one (another)"));
+        assert!(
+            refused(&bench.learning(""), &other_board).contains("with another board (test) than this one (another)")
+        );
         fs::copy(&file, bench.path("mine.B8.learned.toml")).unwrap();
         let said = refused(&bench.learning(""), &sensor(Some("B8"), "COM4"));
         assert!(said.contains("another sensor (serial number A7) than this one (serial number B8)"), "{said}");

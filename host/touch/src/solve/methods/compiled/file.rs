@@ -8,8 +8,7 @@ use tactomo_touch_core::table::{MAX_KNOTS, MAX_SIDE, bytes_of};
 use tactomo_touch_core::{MAX_ELECTRODES, Table, TableError};
 
 /// The longest that there is.
-const FORMAT: Format =
-    Format::new("a table of a detector", bytes_of(MAX_ELECTRODES, [MAX_SIDE; 2], MAX_KNOTS) as u64);
+const FORMAT: Format = Format::new("a table of a detector", bytes_of(MAX_ELECTRODES, [MAX_SIDE; 2], MAX_KNOTS) as u64);
 
 /// The bytes of a table that is whole and sound.
 #[derive(Clone, Debug)]
