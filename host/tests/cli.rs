@@ -474,6 +474,81 @@ fn boards_that_are_recorded_in_a_folder_are_cut_and_shown_again_as_one() {
     assert_eq!((names.join(" "), code), ("board-1 board-2".to_owned(), Some(0)), "{messages}");
 }
 
+#[cfg(unix)]
+#[test]
+fn of_a_folder_of_recordings_no_link_is_followed_and_nothing_acts() {
+    use std::os::unix::fs::symlink;
+
+    let folder = Folder::new("foreign");
+    let [taken, piece, out] = ["taken", "piece", "out.tactomo"].map(|name| folder.path(name));
+    TACTOMO.succeeds(&["live", "--simulate", "2", "--seconds", "0.5", "--json", "--record", &taken]);
+    let skin = format!("{taken}/skin.toml");
+    let sound = std::fs::read_to_string(&skin).unwrap();
+    let acting = sound.replacen("[[patch]]", &format!("[[patch]]\nrecord = \"{out}\""), 1);
+    std::fs::write(&skin, acting).unwrap();
+    let refused = TACTOMO.refused(&["live", "--skin", &taken, "--seconds", "0.5", "--json"]);
+    assert!(refused.contains("patch board-1 of ") && refused.contains("\"record\""), "{refused}");
+    assert!(!std::path::Path::new(&out).exists());
+    let secret = folder.with("secret", &sound);
+    let cut = ["recording", "cut", &taken, "--out", &piece];
+    std::fs::remove_file(&skin).unwrap();
+    symlink(&secret, &skin).unwrap();
+    assert!(TACTOMO.refused(&cut).contains("it is a link"));
+    std::fs::remove_file(&skin).unwrap();
+    let recording = format!("{taken}/board-1.tactomo");
+    std::fs::rename(&recording, &out).unwrap();
+    symlink(&out, &recording).unwrap();
+    assert!(TACTOMO.refused(&cut).contains("it is a link"));
+    assert!(!std::path::Path::new(&piece).exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn files_without_end_are_refused_by_their_formats_limit() {
+    let zeros = "/dev/zero";
+    let live = ["live", "--simulate", "--json", "--seconds", "0.5"];
+    for (args, told) in [
+        (&["live", "--json", "--skin", zeros][..], "a skin's file"),
+        (&[&live[..], &["--jacobian", zeros]].concat(), "a Jacobian"),
+        (&[&live[..], &["--learned", zeros]].concat(), "`tactomo-lab learn`"),
+        (&["forward", "--touches", zeros], "a list of touches"),
+        (&["board", "table", "--simulate", "--file", zeros], "a table of a detector"),
+    ] {
+        let (code, message) = TACTOMO.failure(args);
+        assert!(code != Some(0) && message.contains(told) && message.contains("zero"), "{args:?}: {message}");
+    }
+}
+
+#[test]
+fn a_table_is_checked_before_a_board_hears_of_it() {
+    let folder = Folder::new("table");
+    let [whole, small] = ["whole.table", "small.table"].map(|name| folder.path(name));
+    TACTOMO.succeeds(&["detector", "compile", "square-60", "--out", &whole]);
+    TACTOMO.succeeds(&["detector", "compile", "display-140x70", "--out", &small]);
+    let bytes = std::fs::read(&whole).unwrap();
+    let changed = |at: usize| [&bytes[..at], &[bytes[at] ^ 1], &bytes[at + 1..]].concat();
+    // A port that is none: nothing is said there.
+    let given = |file: &str, to: &[&str]| TACTOMO.run(&[&["board", "table", "--file", file], to].concat());
+    for (bytes, told) in [
+        (changed(0), "no table of a detector"),
+        (changed(4), "version"),
+        (changed(bytes.len() / 2), "checksum"),
+        (bytes[..bytes.len() - 9].to_vec(), "bytes where"),
+        ([&bytes[..], &[0]].concat(), "bytes"),
+        (Vec::new(), "no table of a detector"),
+    ] {
+        let output = given(&folder.with("damaged.table", bytes), &["--port", "/no/such/port"]);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(1) && message.contains("damaged.table"), "{message}");
+        assert!(message.contains(told) && !message.contains("/no/such/port"), "{told}: {message}");
+    }
+    let output = given(&small, &["--simulate", "--board", "ideal"]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && message.contains("the table is of"), "{message}");
+    let output = given(&whole, &["--simulate", "--board", "ideal"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
 #[test]
 fn places_on_a_body_stay_with_a_folder_of_recordings() {
     let folder = Folder::new("body");

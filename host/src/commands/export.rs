@@ -186,12 +186,11 @@ impl Args {
 
     /// Where the detectors of a folder lie on a body, by name, as far as its skin's file tells.
     fn places(&self) -> anyhow::Result<Vec<(String, Place)>> {
-        let path = self.file.join(SKIN);
-        if !path.is_file() {
+        if self.file.join(SKIN).symlink_metadata().is_err() {
             return Ok(Vec::new());
         }
         let placed = |Patch { name, place, .. }| Some((name, place?));
-        Ok(skin::read(&path)?.into_iter().filter_map(placed).collect())
+        Ok(skin::read(&self.file)?.into_iter().filter_map(placed).collect())
     }
 
     fn input<'a>(&'a self, file: &'a Path) -> Input<'a> {

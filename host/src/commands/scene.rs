@@ -1,6 +1,5 @@
 //! Arguments that say what touches a simulated detector, and what is wrong with it.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
@@ -9,6 +8,7 @@ use tactomo::detector::Detector;
 use tactomo::hertz::{self, Hertz, RATIO, Skin, Surface, YOUNG_PA};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
+use tactomo::table::file::Format;
 
 use super::as_built::AsBuiltArgs;
 use tactomo_cli::options;
@@ -16,6 +16,8 @@ use tactomo_cli::output::message;
 
 /// Default seed.
 const SEED: u64 = 1;
+/// A list of touches, some hundred bytes each.
+const TOUCHES: Format = Format::new("a list of touches", 16 << 20);
 
 /// A scene, its hand and faults.
 #[derive(Clone, Debug, clap::Args)]
@@ -185,7 +187,7 @@ pub fn press(text: &str) -> Result<Press, String> {
 
 /// Touches from a JSON file.
 pub fn read_touches(path: &Path) -> anyhow::Result<Vec<Touch>> {
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read the touches {}", path.display()))?;
+    let text = TOUCHES.read_text(path).with_context(|| format!("cannot read the touches {}", path.display()))?;
     let touches: Vec<Touch> =
         serde_json::from_str(&text).with_context(|| format!("{} is no list of touches", path.display()))?;
     for (index, touch) in touches.iter().enumerate() {

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use tactomo_board::identity::Sensor;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{Method, Parts};
 
 use super::Listener;
 use super::answers::Answers;
 use super::beneath::{Beneath, BeneathNotice};
-use super::calibration::Calibration;
+use super::calibration::{Calibration, Meeting};
 use super::event::TouchEvent;
 use super::inbox::{Event, Found, Inbox, Searched, Taken};
 use super::notice::NoticeBoard;
@@ -100,6 +101,7 @@ impl FollowLoop {
                 }
                 Event::Quiet => self.be_quiet(),
                 Event::Board(description) => self.begin_with(description),
+                Event::Sensor(sensor) => self.meet(sensor),
                 Event::Method(method) => self.solvers.change_method(method),
                 Event::Pointer(on) => self.answers.set_pointer(on),
                 Event::Solver(made) => self.change_solver(made)?,
@@ -148,6 +150,18 @@ impl FollowLoop {
         self.planner.restart();
         self.calibration.begin_with(Arc::clone(&description));
         self.solvers.begin_with(description);
+    }
+
+    /// Goes on with what was learned before of the sensor that is connected, and with nothing that was learned of another.
+    fn meet(&mut self, sensor: Sensor) {
+        match self.calibration.meet(sensor) {
+            Meeting::AsBefore => {}
+            Meeting::Known(learned) => self.solvers.use_calibrated(learned),
+            Meeting::Unknown(description) => {
+                self.answered = None;
+                self.solvers.forget_calibrated(description);
+            }
+        }
     }
 
     /// Goes on with the detector that a calibration has found, if it has.

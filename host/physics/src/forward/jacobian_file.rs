@@ -3,13 +3,13 @@
 //! `TACTOJAC`, the format's version as four bytes (little-endian), the [`Jacobian`] in postcard, and the CRC-32 (ISO-HDLC)
 //! of all bytes before as four bytes (little-endian). The detector is in it, so that it is never used for another.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+use tactomo_table::file::Format;
 
 use super::ImageMesh;
 use super::jacobian::Jacobian;
@@ -17,9 +17,11 @@ use crate::detector::{Detector, Surface};
 
 const MAGIC: &[u8; 8] = b"TACTOJAC";
 const VERSION: u32 = 4;
+/// Fields of 16384 nodes for 32 electrodes take 4 MiB.
+const FORMAT: Format = Format::new("a Jacobian", 64 << 20);
 const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Why a Jacobian cannot be saved or loaded.
+/// Why a Jacobian cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JacobianFileError {
@@ -78,7 +80,7 @@ impl Jacobian {
     /// # Errors
     /// [`JacobianFileError`] if it is no whole file of this format or was made for another detector.
     pub fn load(path: &Path, detector: &Detector) -> Result<Self, JacobianFileError> {
-        let bytes = fs::read(path).map_err(|source| JacobianFileError::Read { path: path.to_owned(), source })?;
+        let bytes = FORMAT.read(path).map_err(|source| JacobianFileError::Read { path: path.to_owned(), source })?;
         let jacobian = parse(&bytes, path)?;
         match difference(&jacobian.detector, detector) {
             Some(difference) => Err(JacobianFileError::OtherDetector { path: path.to_owned(), difference }),
@@ -180,6 +182,8 @@ impl Stored {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::forward::shell::Shell;
 
@@ -232,11 +236,8 @@ mod tests {
 
     #[test]
     fn damage_is_found() -> Result<(), Box<dyn std::error::Error>> {
-        let path = std::env::temp_dir().join(format!("tactomo-damage-{}.jacobian", std::process::id()));
-        fs::write(&path, jacobian().to_bytes()?)?;
-        let whole = fs::read(&path)?;
-        fs::remove_file(&path)?;
-        let message = |bytes: &[u8]| parse(bytes, &path).map_or_else(|error| error.to_string(), |_| String::new());
+        let (whole, path) = (jacobian().to_bytes()?, Path::new("my.jacobian"));
+        let message = |bytes: &[u8]| parse(bytes, path).map_or_else(|error| error.to_string(), |_| String::new());
         let changed = |at: usize| {
             whole.iter().enumerate().map(|(i, &byte)| if i == at { byte ^ 1 } else { byte }).collect::<Vec<_>>()
         };
