@@ -52,6 +52,9 @@ pub const OTHERS: usize = 2;
 /// Radii that quantities are stored for.
 pub const RADII: usize = 2;
 
+/// Largest number of a table, apart from its head's: ohm, or what makes such.
+pub(crate) const MOST: f32 = 1e9;
+
 /// Where the table's length stands, and the numbers of its [`Head`].
 const LENGTH_AT: usize = 16;
 const NUMBERS_AT: usize = 24;
@@ -155,8 +158,9 @@ impl Floats<'_> {
         self.at(high * (high + 1) / 2 + low)
     }
 
-    fn are_finite(self) -> bool {
-        (0..self.0.len()).all(|index| self.at(index).is_finite())
+    fn are_within(self, most: f32) -> bool {
+        // As numbers without their signs these have the order of their bits; what is none has more. A board without floating point looks at each frame.
+        self.0.iter().all(|bytes| u32::from_le_bytes(*bytes) & !(1 << 31) <= most.to_bits())
     }
 }
 
@@ -257,7 +261,7 @@ impl<'a> Table<'a> {
         table.check()
     }
 
-    /// Checks that all numbers are numbers.
+    /// Checks that all numbers are numbers of a detector.
     fn check(self) -> Result<Self, TableError> {
         let all = [
             ("fields between electrodes", self.pads),
@@ -266,8 +270,8 @@ impl<'a> Table<'a> {
             ("fields of walls", self.walls),
             ("steps of codes", self.codes),
         ];
-        let gains_are_sound = (0..self.electrodes).all(|e| self.channels.at(2 * e) > 0.0);
-        match all.into_iter().find(|(_, floats)| !floats.are_finite()) {
+        let gains_are_sound = (0..self.electrodes).all(|e| (1e-3..=1e3).contains(&self.channels.at(2 * e)));
+        match all.into_iter().find(|(_, floats)| !floats.are_within(MOST)) {
             Some((what, _)) => Err(TableError::Number { what }),
             None if !gains_are_sound => Err(TableError::Number { what: "gains" }),
             None => Ok(self),

@@ -112,4 +112,8 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Touch for Digitizer<S,
         self.report(found.as_ref(), scanned.time_us);
         found.filter(|_| self.output.has_contacts())
     }
+
+    fn go_on(&mut self, attend: &mut dyn FnMut()) {
+        self.finder.go_on(attend);
+    }
 }

@@ -12,6 +12,10 @@ use super::tables::Tables;
 use super::{TableStore, Touch};
 use crate::scan::Scanned;
 
+/// Pieces of the work on a frame that are done at once: contacts that are followed rarely take more. What is left, most of a search, is done between rows, a piece each,
+/// while commands are obeyed and the scan goes on. Frames that come meanwhile are not looked at.
+const AT_ONCE: u32 = 6;
+
 /// Finds contacts by a table that it keeps in `S`, in frames of up to `READINGS` readings.
 #[derive(Debug)]
 pub struct ContactFinder<S, const READINGS: usize> {
@@ -24,6 +28,8 @@ pub struct ContactFinder<S, const READINGS: usize> {
     broken_wires: u32,
     last_broken: u32,
     told_broken: u32,
+    /// What was told last, if anything was.
+    told: Option<Contacts>,
 }
 
 impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
@@ -38,6 +44,7 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
             broken_wires: 0,
             last_broken: 0,
             told_broken: 0,
+            told: None,
         }
     }
 
@@ -49,6 +56,23 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
     /// Which table contacts are found by.
     pub(super) fn used(&self) -> Option<TableId> {
         self.tables.used()
+    }
+
+    /// Does so many pieces of the work on a frame; `None` if there is nothing to work on.
+    fn work(&mut self, pieces: u32, attend: &mut dyn FnMut()) -> Option<()> {
+        let Self { tables, solver, cells, .. } = self;
+        let table = tables.table()?;
+        let Some(answer) = solver.solve_in_pieces(&table, &cells.touch(&table)?, pieces, attend).ok()? else {
+            return Some(());
+        };
+        self.broken_wires = answer.left_out & self.last_broken;
+        self.last_broken = answer.left_out;
+        if cells.learn(&answer, &table) {
+            // What follows is above rest.
+            solver.reset();
+        }
+        self.told = Some(told(&answer));
+        Some(())
     }
 }
 
@@ -90,6 +114,7 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
         self.solver.reset();
         self.cells.restart();
         self.told_broken = 0;
+        self.told = None;
     }
 
     fn take_broken_wires(&mut self) -> u32 {
@@ -105,24 +130,29 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
         readings: &[u16],
         attend: &mut dyn FnMut(),
     ) -> Option<Contacts> {
-        let Self { tables, input, output, solver, cells, .. } = self;
-        if !output.has_contacts() {
+        if !self.output.has_contacts() {
             return None;
         }
-        let table = tables.table()?;
-        let frame = cells.touch(&table, input, (scanned, scope, readings))?;
-        let answer = solver.solve_while(&table, &frame, attend).ok()?;
-        self.broken_wires = answer.left_out & self.last_broken;
-        self.last_broken = answer.left_out;
-        if cells.learn(&answer, &table) {
-            // What follows is above rest.
-            solver.reset();
+        if !self.solver.is_busy() {
+            let Self { tables, input, cells, .. } = self;
+            cells.take(&tables.table()?, input, (scanned, scope, readings));
+            self.work(AT_ONCE, attend)?;
         }
-        let mut contacts = told(&answer);
-        if !cells.knows_rest() {
+        let nothing = || told(&Answer::default());
+        let mut contacts = self.told.clone().unwrap_or_else(nothing);
+        if self.solver.is_busy() {
+            contacts.flags.raise(ContactFlags::MISFIT);
+        }
+        if !self.cells.knows_rest() {
             contacts.flags.raise(ContactFlags::RESTING);
         }
         Some(contacts)
+    }
+
+    fn go_on(&mut self, attend: &mut dyn FnMut()) {
+        if self.output.has_contacts() && self.solver.is_busy() {
+            let _ = self.work(1, attend);
+        }
     }
 }
 

@@ -8,6 +8,8 @@ mod input;
 mod rest;
 mod store;
 mod tables;
+#[cfg(test)]
+mod tests;
 
 use tactomo_protocol::{Contacts, Hello, Output, Scope, TablePiece, TableState};
 
@@ -47,7 +49,8 @@ pub trait Touch {
         0
     }
 
-    /// The contacts of a frame, if they are to be streamed. Whoever has something else to do is called by `attend` meanwhile.
+    /// The contacts of a frame, if they are to be streamed: while one before is still worked on, those that were told last. Whoever has something else to do is
+    /// called by `attend` meanwhile.
     fn contacts(
         &mut self,
         scanned: &Scanned,
@@ -55,6 +58,9 @@ pub trait Touch {
         readings: &[u16],
         attend: &mut dyn FnMut(),
     ) -> Option<Contacts>;
+
+    /// Does a piece of the work on a frame that is still worked on, if there is one: comes between two rows, and between commands.
+    fn go_on(&mut self, _attend: &mut dyn FnMut()) {}
 }
 
 /// A board that streams frames and nothing else: takes no memory.

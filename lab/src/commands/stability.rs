@@ -29,7 +29,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let Args { detector, study } = args;
     let files = study.shown.files()?;
-    let [places, frames] = study.places_and_frames(if study.quick { [1, 2] } else { [3, 2] });
+    let [places, frames] = study.places_and_frames(if study.quick { [5, 1] } else { [5, 2] });
     let plan = Plan {
         detector: detector.get()?,
         methods: study.methods(),

@@ -29,7 +29,10 @@ fn contacts_are_where_something_presses_and_follow_a_rest_that_is_known() {
     assert!((off_m[0] - place_m[0]).hypot(off_m[1] - place_m[1]) < 3e-4, "{contact:?}");
     assert!(contact.sigma_m().is_some_and(|sigma_m| sigma_m < 1e-3), "{contact:?}");
     assert_eq!(pressed[19].flags, ContactFlags::default());
-    assert!(pressed[1..].iter().all(|contacts| contacts.found.first().is_some_and(|first| first.id == contact.id)));
+    // It lands in the first, and is searched from the second on, while frames go on: with misfit until it is found.
+    let found = pressed.iter().position(|contacts| !contacts.found.is_empty()).unwrap();
+    assert!(found < 8 && pressed[..found].iter().all(|contacts| contacts.flags.has(ContactFlags::MISFIT)), "{found}");
+    assert!(pressed[found..].iter().all(|contacts| contacts.found.first().is_some_and(|first| first.id == contact.id)));
     let sequences: Vec<_> = pressed.iter().map(|contacts| contacts.head.sequence).collect();
     assert!(sequences.windows(2).all(|two| two[1] == two[0] + 1));
 }
@@ -43,10 +46,38 @@ fn a_press_in_the_first_frame_is_told_and_rest_is_learned_when_it_goes() {
     bench.command(Command::Start);
     let pressed = bench.scan(&mut pressing, 200);
     let is_told = |contacts: &Contacts| contacts.found.len() == 1 && contacts.flags.has(ContactFlags::RESTING);
-    assert_eq!(pressed.iter().position(|contacts| !is_told(contacts)), None, "{:?}", pressed.first());
+    // But for those that come while it is searched.
+    assert_eq!(pressed[8..].iter().position(|contacts| !is_told(contacts)), None, "{:?}", pressed.first());
     let after = bench.scan(&mut simulation(&[]), 100);
     let last = &after[99];
     assert!(last.found.is_empty() && !last.flags.has(ContactFlags::RESTING), "{last:?}");
+}
+
+/// A search takes many frames. Each command is obeyed between two rows.
+#[test]
+fn commands_are_obeyed_and_frames_go_on_while_a_search_is_under_way() {
+    let mut bench = Bench::new(finder(table_memory()));
+    bench.command(Command::Output(Output::Contacts));
+    bench.command(Command::Start);
+    bench.scan(&mut simulation(&[]), 80);
+    let three = [[0.011, -0.007], [-0.014, 0.009], [0.002, 0.019]].map(finger);
+    // Landing; then the search begins.
+    let begun = bench.scan(&mut simulation(&three), 3);
+    assert!(begun.iter().all(|contacts| contacts.flags.has(ContactFlags::MISFIT)), "{begun:?}");
+    // A row later there is an answer.
+    let answers = bench.command(Command::Hello);
+    assert!(answers.iter().any(|message| matches!(message, BoardMessage::Hello(_))), "{answers:?}");
+    let sequences: Vec<_> = begun.iter().map(|contacts| contacts.head.sequence).collect();
+    assert!(sequences.windows(2).all(|two| two[1] == two[0] + 1), "{sequences:?}");
+    let found = bench.scan(&mut simulation(&three), 40);
+    let last = &found[found.len() - 1];
+    assert!(last.found.len() == 3 && !last.flags.has(ContactFlags::MISFIT), "{last:?}");
+    // One that is stopped is given up.
+    bench.scan(&mut simulation(&[finger([0.0, 0.01])]), 2);
+    let stopped = bench.command(Command::Stop);
+    assert!(stopped.iter().any(|m| matches!(m, BoardMessage::Hello(hello) if !hello.is_streaming)), "{stopped:?}");
+    bench.command(Command::Start);
+    assert!(bench.scan(&mut simulation(&[]), 4).iter().all(|contacts| contacts.found.is_empty()));
 }
 
 #[test]

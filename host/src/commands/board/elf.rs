@@ -1,17 +1,16 @@
 //! Whether an image can run on a board: the head of an ELF file, and where its segments lie
 //! (System V ABI, "Object Files", <https://refspecs.linuxfoundation.org/elf/gabi4+/ch4.eheader.html>).
 
-use std::fs::File;
-use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
+use tactomo::table::file::Format;
 
 use super::firmware::Board;
 
-/// No image with its symbols is longer (bytes): ours are 2 MB.
-const LONGEST: u64 = 256 << 20;
+/// An image with its symbols: ours are 2 MB.
+const FORMAT: Format = Format::new("an image of a board", 256 << 20);
 /// Bytes of the head and of an entry of the table of segments, in 32 bits.
 const HEAD: usize = 52;
 const SEGMENT: usize = 32;
@@ -100,9 +99,7 @@ struct Segment {
 /// If it is no image, or none for this board: what it is, and what to do.
 pub fn check(path: &Path, board: Board) -> anyhow::Result<()> {
     let named = || path.display().to_string();
-    let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(LONGEST).read_to_end(&mut bytes));
-    read.with_context(|| format!("cannot read the image {}", named()))?;
+    let bytes = FORMAT.read(path).with_context(|| format!("cannot read the image {}", named()))?;
     judge(&bytes, board).with_context(|| {
         format!(
             "{} is no image for the board {}: build one with {}, or name another with --image",
