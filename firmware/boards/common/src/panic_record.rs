@@ -9,7 +9,7 @@ const MAX_TEXT: usize = 96;
 /// Marks a record that was written whole.
 const MAGIC: [u8; 4] = *b"PNC1";
 
-/// Bytes of a record: a mark, the sum of the rest, the length of the text, the text.
+/// Bytes of a record: a mark, the sum of the text and its length, the length of the text, the text.
 pub const RECORD_BYTES: usize = 4 + 1 + 1 + MAX_TEXT;
 
 /// A view of the memory that outlives a reset. After power-on it holds anything.
@@ -67,7 +67,8 @@ fn end_of(path: &str) -> &str {
 
 /// A checksum that notices memory that decayed while the power was off.
 fn sum(text: &[u8]) -> u8 {
-    text.iter().fold(0, |sum: u8, byte| sum.rotate_left(1) ^ byte)
+    // From its length on: zeros behind a text would be none of it else.
+    text.iter().fold(text.len() as u8, |sum, byte| sum.rotate_left(1) ^ byte)
 }
 
 /// Text that keeps what fits and forgets the rest.
