@@ -48,8 +48,7 @@ fn of_numbers(command: &Command, before: &[String]) -> Vec<Vec<String>> {
         TypeId::of::<Duration>(),
     ];
     let is_number = |arg: &&Arg| numbers.iter().any(|number| arg.get_value_parser().type_id() == *number);
-    let has_value = |arg: &&Arg| arg.get_num_args().is_none_or(|count| count.takes_values());
-    let takes = |arg: &&Arg| arg.get_action().takes_values() && has_value(arg) && is_number(arg);
+    let takes = |arg: &&Arg| has_value(arg) && is_number(arg);
     let option = |arg: &Arg| Some([before, &[format!("--{}", arg.get_long()?)]].concat());
     let own = command.get_arguments().filter(takes).filter_map(option);
     let subs =
@@ -59,9 +58,13 @@ fn of_numbers(command: &Command, before: &[String]) -> Vec<Vec<String>> {
 
 /// The command, whose options take `-3` as a value: what is wrong with that is said of the value. Else the parser looks for an option of that name.
 fn taking_negative_numbers(command: Command) -> Command {
-    let takes_values = |arg: &Arg| !arg.is_positional() && arg.get_action().takes_values();
-    let take = |arg: Arg| if takes_values(&arg) { arg.allow_negative_numbers(true) } else { arg };
+    let take = |arg: Arg| if !arg.is_positional() && has_value(&arg) { arg.allow_negative_numbers(true) } else { arg };
     command.mut_args(take).mut_subcommands(taking_negative_numbers)
+}
+
+/// Whether an option has a value, or may have one.
+fn has_value(arg: &Arg) -> bool {
+    arg.get_action().takes_values() && arg.get_num_args().is_none_or(|count| count.takes_values())
 }
 
 /// Says why a command line is refused, or what was asked for by `--help` and `--version`, and ends the program.

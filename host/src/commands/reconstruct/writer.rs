@@ -1,7 +1,7 @@
 //! What was found, for people, as JSON, CSV or NPZ: the names are those of [`tactomo::schema`].
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Cursor, Write};
 
 use anyhow::bail;
 use tactomo::detector::short;
@@ -243,8 +243,10 @@ impl Arrays {
         }
     }
 
-    fn write(&self, out: BufWriter<File>, mesh: Option<&ImageMesh>) -> io::Result<()> {
-        let mut writer = NpzWriter::new(out);
+    fn write(&self, mut out: BufWriter<File>, mesh: Option<&ImageMesh>) -> io::Result<()> {
+        // In memory, as the arrays are: an archive that cannot be ended says so on stderr by itself.
+        let mut bytes = Vec::new();
+        let mut writer = NpzWriter::new(Cursor::new(&mut bytes));
         for (frame, values) in FRAME_COLUMNS.iter().zip(&self.frames.0) {
             let (count, values) = values.values();
             writer.add_values(frame.name, &[count], values)?;
@@ -277,12 +279,14 @@ impl Arrays {
                 writer.add(name, &shape, readings)?;
             }
         }
-        writer.finish()
+        writer.finish()?;
+        out.write_all(&bytes)?;
+        out.flush()
     }
 }
 
 /// Adds a column in its kind; what is not known is -1 of an integer and false of a flag.
-fn column(writer: &mut NpzWriter<BufWriter<File>>, name: &str, kind: Kind, values: &[f64]) -> io::Result<()> {
+fn column(writer: &mut NpzWriter<Cursor<&mut Vec<u8>>>, name: &str, kind: Kind, values: &[f64]) -> io::Result<()> {
     let shape = [values.len()];
     match kind {
         Kind::Number => writer.add(name, &shape, values),
