@@ -7,8 +7,8 @@ use tactomo_touch::solve::{FoundContact, FoundShape, Solution};
 use crate::scenes::electrode_distance_m;
 use tactomo_physics::detector::Detector;
 
-/// An answer is wrong from so far off on, in mean distances of electrodes: 2.25 mm of 15. That is half of 4.5 mm, the least distance at which two firm contacts
-/// are told apart from one frame (`stability`, "Distance of two firm contacts"): what is farther off stands for another place.
+/// An answer is wrong from so far off on, in mean distances of electrodes: 2.25 mm of 15, which is half of 4.5 mm, about the least distance at which two firm
+/// contacts are told apart: what is farther off stands for another place.
 pub const WRONG_SHARE: f64 = 0.15;
 /// What is claimed holds if the error is within so many standard errors: of normal errors 1.1 % are beyond, in both coordinates together.
 const COVERED_SIGMAS: f64 = 3.0;
