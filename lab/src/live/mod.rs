@@ -10,7 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
-use tactomo::run::calibration::Learning;
+use tactomo::run::calibration::{Keeping, Learning};
 use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Listener, Snapshot, TouchEvent};
@@ -130,7 +130,7 @@ fn run(case: &Case) -> anyhow::Result<Found> {
     let (recorder, file) = kept.map_or((None, None), |(recorder, file)| (Some(recorder), Some(file)));
     let options = |time| -> anyhow::Result<RunOptions> {
         let solving = Solving::new(case.method, Problem::of(&detector)?);
-        let learning = Learning::of(&detector, None).filter(|_| case.learns);
+        let learning = Learning::of(&detector, Keeping::Nowhere).filter(|_| case.learns);
         Ok(RunOptions {
             scan: case.scan.clone(),
             solving: Some(Solving { learning, ..solving }),

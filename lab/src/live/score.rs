@@ -144,7 +144,7 @@ mod tests {
 
     use super::*;
     use tactomo_physics::scene::{Hand, SceneName};
-    use tactomo_touch::solve::{FoundContact, FoundRing};
+    use tactomo_touch::solve::{FoundContact, FoundRing, FoundShape};
 
     const FRAME_S: f64 = 0.01;
 
