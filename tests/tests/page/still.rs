@@ -32,8 +32,11 @@ fn contact(id: u32, [x_mm, y_mm]: [f64; 2], conductance_s: f64) -> FoundContact 
 /// What is told where nothing was found.
 const BENEATH: Beneath = Beneath { floor_v: 0.142, is_pressed: false };
 
+/// A state of the page: its name, and what brings it about.
+type State = (&'static str, fn(&Script));
+
 /// What [`STATES`] do not have: what is told, after a page on which nothing touches.
-const MORE: [(&str, fn(&Script)); 7] = [
+const MORE: [State; 7] = [
     ("negative", |script| script.contacts(vec![contact(1, [-25.4, -16.1], 9.99e-4)])),
     ("eleven", |script| {
         script.contacts((1..=11).map(|k| contact(k, [5.0 * f64::from(k) - 30.0, 3.0 * f64::from(k)], 1e-4)).collect());
