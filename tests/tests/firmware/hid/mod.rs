@@ -140,13 +140,13 @@ fn a_pad_without_a_host_tells_where_something_presses_and_once_that_it_has_gone(
     let place_m = [0.011, -0.007];
     pad.scan(&mut simulation(&[finger(place_m)]), 11);
     let pressed = sink.told();
-    // From the second frame on.
-    assert_eq!(pressed.len(), 10);
+    // From the third frame on: the second is searched while the rows of the next come.
+    assert_eq!(pressed.len(), 9);
     assert!(pressed.iter().all(|told| told.len() == 1 && told[0].touches && is_near(told[0], place_m)), "{pressed:?}");
     assert!(pressed.iter().all(|told| told[0].id == pressed[0][0].id && told[0].id > 0));
     pad.scan(&mut simulation(&[]), 10);
     // In the frame in which it lifts, what there was stays.
-    let lifted = [true, false].map(|touches| vec![Told { touches, ..pressed[9][0] }]);
+    let lifted = [true, false].map(|touches| vec![Told { touches, ..pressed[8][0] }]);
     assert_eq!(sink.told(), lifted);
     // Nothing but the Hello was said on the line, and nobody was asked.
     assert_eq!(pad.outside.messages(), []);
@@ -311,7 +311,7 @@ fn a_pad_that_is_pressed_before_rest_is_known_is_silent_until_it_is() {
     assert_eq!(sink.told().len(), 0);
     pad.scan(&mut simulation(&[]), 100);
     pad.scan(&mut simulation(&[finger([0.0, 0.01])]), 3);
-    assert_eq!(sink.told().len(), 2);
+    assert_eq!(sink.told().len(), 1);
     let size_m = sink.0.borrow().size_m.map(f64::from);
     let [low_m, high_m] = DETECTOR.outline.bounds();
     assert!((0..2).all(|axis| (size_m[axis] - (high_m[axis] - low_m[axis])).abs() < 1e-6));
