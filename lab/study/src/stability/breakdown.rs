@@ -275,7 +275,7 @@ mod tests {
         let refused = Score { failed: true, is_wrong: true, ..Score::default() };
         let missed = Score { is_wrong: true, missed: Some(1), ..score(0.1) };
         // At its harmless point a method is off by 0.1, 3.6, 0.1, 3.6, ... mm.
-        let before = [score(0.1), score(3.6)].repeat(4);
+        let before: Vec<Score> = (0..4).flat_map(|_| [score(0.1), score(3.6)]).collect();
         let now = [score(2.2), score(3.9), covered, score(7.7), flagged(9.0), refused, missed, flagged(0.1)];
         let classes = cell(&now, &before).classes;
         let of = |count: f64| count / 8.0;
