@@ -1,6 +1,6 @@
-"""Sets `tactomo-lab learn` against scikit-learn's KernelRidge, on the same presses of made-up and of real skins.
+"""Sets `tactomo-lab learn` against scikit-learn's KernelRidge, on the same presses of made-up and of real sensors.
 
-The presses are those that the example `skins` makes up (six kinds, 1800 taught, 400 unseen), or those of `tools/real_skins.py` (five, 2000 taught, 500
+The presses are those that the example `sensors` makes up (six kinds, 1800 taught, 400 unseen), or those of `tools/real_sensors.py` (five, 2000 taught, 500
 unseen): all pairs `KIND-SEED-taught.npz`, `KIND-SEED-unseen.npz` in a folder. KernelRidge has a Gaussian kernel, whose width and ridge are searched
 by cross-validation in three folds (least squares over x, y and z in metres), on each of two descriptions: the standardised channels,
 as one would begin with, and the direction and the logarithm of the size of the readings. `tactomo` chooses between the same two. All are judged
@@ -8,8 +8,8 @@ by the mean distance on the unseen presses. A second table says how many reading
 
     python3 -m venv .venv && .venv/bin/pip install numpy scikit-learn
     cargo build --release --package tactomo-lab
-    cargo run --release --package tactomo-lab --example skins -- skins 2
-    .venv/bin/python tools/compare_sklearn.py skins 2 [target/release/tactomo-lab]
+    cargo run --release --package tactomo-lab --example sensors -- sensors 2
+    .venv/bin/python tools/compare_sklearn.py sensors 2 [target/release/tactomo-lab]
 """
 
 import json
@@ -142,7 +142,7 @@ def flagged(program, folder, seed):
 def main():
     folder, seed = pathlib.Path(sys.argv[1]), sys.argv[2]
     program = sys.argv[3] if len(sys.argv) > 3 else "target/release/tactomo-lab"
-    print("| skin | channels | KernelRidge: channels | directions | its search | tactomo | described by | dimensions | fit | a press | flagged |")
+    print("| sensor | channels | KernelRidge: channels | directions | its search | tactomo | described by | dimensions | fit | a press | flagged |")
     print("|---" * 11 + "|")
     for kind in kinds(folder, seed):
         taught, unseen = (presses(folder, kind, seed, part) for part in ("taught", "unseen"))

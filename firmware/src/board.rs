@@ -149,7 +149,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
         }
     }
 
-    /// Handles what was received and scans one row, if one is due. Takes one settle time and one row of conversions at most.
+    /// Handles what was received and scans one row, if one is due. Takes one settle time and one row of conversions at most, and what the touch part takes for a
+    /// [piece](Touch::go_on) of its work.
     ///
     /// # Errors
     /// If a pin of the multiplexer cannot be driven.
@@ -157,6 +158,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
         self.parts.chip.feed_watchdog();
         self.rate.turn(&mut self.parts.serial, &mut self.parts.chip, &mut self.uplink);
         self.receive();
+        self.go_on();
         let activity = self.scan_if_due();
         self.uplink.poll(&mut self.parts.serial, &mut self.parts.chip);
         activity
@@ -171,7 +173,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
                 Ok(request) => self.obey(request),
                 Err(DecodeError::Version(version)) => self.fault(Fault::UnknownVersion(version)),
                 // Noise is dropped; a body that this version does not know cannot be answered.
-                Err(DecodeError::Corrupt | DecodeError::Body | DecodeError::Key) => {}
+                Err(_) => {}
             }
         }
         self.inbox.clear();
@@ -302,6 +304,14 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
         self.scan_row()
     }
 
+    /// Goes on with what is still worked on of frames before.
+    fn go_on(&mut self) {
+        if self.scans() {
+            let Self { parts: Parts { serial, chip, touch, .. }, uplink, inbox, .. } = self;
+            touch.go_on(&mut attending(chip, uplink, serial, inbox));
+        }
+    }
+
     fn scan_row(&mut self) -> Result<Activity, M::Error> {
         let Self { parts, scan, uplink, inbox, .. } = self;
         let Parts { mux, sampler, serial, chip, touch } = parts;
@@ -325,11 +335,9 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, T: Touch, const READINGS: usize, co
         self.stuck_reported = scanned.stuck;
         let Self { parts, scan, uplink, inbox, .. } = self;
         let Parts { serial, chip, touch, .. } = parts;
-        let mut attend = || {
-            chip.feed_watchdog();
-            Line { uplink, serial, inbox, waits: true }.transfer(chip);
-        };
+        let mut attend = attending(chip, uplink, serial, inbox);
         let contacts = touch.contacts(&scanned, scan.scope(), scan.readings(), &mut attend);
+        drop(attend);
         if !is_silent {
             let readings = touch.output().has_frames().then(|| (scan.scope(), scan.readings()));
             uplink.frame(&scanned, readings, contacts);
@@ -357,6 +365,19 @@ struct Line<'a, L, const READINGS: usize, const WIRE: usize> {
     inbox: &'a mut Inbox,
     /// Whether frames wait for it.
     waits: bool,
+}
+
+/// Keeps watchdog and line alive while something else goes on.
+fn attending<C: Chip, L: Serial, const READINGS: usize, const WIRE: usize>(
+    chip: &mut C,
+    uplink: &mut Uplink<READINGS, WIRE>,
+    serial: &mut L,
+    inbox: &mut Inbox,
+) -> impl FnMut() {
+    move || {
+        chip.feed_watchdog();
+        Line { uplink, serial, inbox, waits: true }.transfer(chip);
+    }
 }
 
 impl<L: Serial, C: Chip, const READINGS: usize, const WIRE: usize> Attended<C> for Line<'_, L, READINGS, WIRE> {

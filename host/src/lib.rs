@@ -24,7 +24,9 @@
 //! ```
 
 pub use tactomo_board as board;
-pub use tactomo_physics::{baseline, causes, detector, forward, hertz, nalgebra, readings, scene, simulate, threads};
+pub use tactomo_physics::{
+    baseline, causes, detector, forward, hertz, nalgebra, new_file, readings, scene, simulate, threads,
+};
 pub use tactomo_table as table;
 pub use tactomo_touch::{calibrate, changes, learned, metrics, pointer, schema, solve, vibration};
 

@@ -84,7 +84,7 @@ fn image_of(board: &str) -> Vec<u8> {
 fn an_image_for_another_board_or_none_is_told_before_a_tool_is_called() {
     let tools = Tools::new("images", "espflash", 0);
     let of_c3 = image_of("esp32c3");
-    let long = elf(243, 0x4200_0020, (0x3c00_0000, 0x3d_0000), 0x4200_0020);
+    let long = elf(243, 0x4200_0020, (0x3c00_0000, 0x3b_0000), 0x4200_0020);
     let part = [&of_c3[..16], &1u16.to_le_bytes(), &of_c3[18..]].concat();
     for (image, board, told) in [
         (&b""[..], "esp32c3", "it is empty"),

@@ -214,7 +214,7 @@ fn a_file_is_never_replaced_and_bad_presses_write_none() {
     let precious = folder.with("precious.toml", "precious");
     let output = TACTOMO.run(&["calibrate", "force", &good, "--newtons", &list(&TEN_N), "--out", &precious]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("exists already, and is not replaced"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("exists already, and no file is replaced"));
     assert_eq!(std::fs::read_to_string(&precious).unwrap(), "precious");
 
     let backwards: Vec<f64> = TEN_N.iter().rev().copied().collect();

@@ -277,7 +277,7 @@ fn bad_presses_say_what_to_do_and_write_nothing() {
     assert!(message.contains("has 256 readings a frame, but the detector strip-13x60"), "{message}");
     let precious = folder.with("precious.toml", "precious");
     let output = TACTOMO.run(&["calibrate", "presses", &good, "--places", &places, "--out", &precious]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("exists already, and is not replaced"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("exists already, and no file is replaced"));
     assert_eq!((output.status.code(), std::fs::read_to_string(&precious).unwrap()), (Some(1), "precious".to_owned()));
     assert_eq!(TACTOMO.run(&["calibrate", "presses", &good, "--out", "x.toml"]).status.code(), Some(2));
 }

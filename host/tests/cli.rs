@@ -47,10 +47,15 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["forward", "--scene", "jazz"], "rolling-ball"),
         (&["forward", "--fault", "open"], "open:3, short:2,7"),
         (&["forward", "--press", "0,0,2.5"], "tip_radius_mm,force_n"),
-        (&["forward", "--contact", "0,0,1,1e-3", "--time=-2"], "0 or above"),
+        (&["forward", "--contact", "0,0,1,1e-3", "--time", "-2"], "a time (s) from 0 to"),
+        (&["forward", "--contact", "1,1,1,1e308"], "conductance_s is 1e308, but has to be from 1e-12"),
+        (&["forward", "--press", "1,1,1,1e308"], "a force from 1e-6 N to 10000.0 N: 0.001 m and 1e308 N are given"),
+        (&["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"], "a ratio from -0.99 to 0.5"),
+        (&["live", "--simulate", "--force", "-3"], "invalid value '-3' for '--force <NEWTONS>': a force (N) from"),
+        (&["record", "some.file", "--seconds", "-1"], "invalid value '-1' for '--seconds <SECONDS>': a time (s) from"),
         (&["forward", "--fault", "driving-sheet:100:3"], "1 or 2 points"),
         (&["live", "--time-factor", "10"], "--simulate"),
-        (&["live", "--simulate", "--time-factor", "0"], "above 0"),
+        (&["live", "--simulate", "--time-factor", "1e300"], "a factor from 0.001 to 1000000"),
         (&["calibrate", "force", "some.csv", "--out", "cal.toml"], "--newtons <N,N,...>|--forces <FILE>"),
         (&["dance"], "dance"),
     ] {
@@ -78,19 +83,103 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
             "its driving layer has a sheet resistance, which only the slab can have",
         ),
         (&["forward", "--fault", "leak:0.01", "--save-jacobian", "no.jacobian"], "leave out --fault leak"),
-        (
-            &["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"],
-            "skin.poisson is 0.6, but has to be from -0.99 to 0.5",
-        ),
         (&["live", "--port", "/dev/null", "--elf", text, "--json"], elf),
-        (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
-        (&["detector", "show", "--svg", text], "exists already: give another name, or --overwrite"),
-        (&["forward", "--save-jacobian", text], "exists already: give another name, or --overwrite"),
+        (&["replay", "/tmp", "--json"], "/tmp is a folder, not a recording: name one of the recordings in it"),
+        (&["recording", "info", "/tmp"], "/tmp is a folder, not a recording: name one of the recordings in it"),
     ] {
         let (code, message) = TACTOMO.failure(args);
         assert_eq!(code, Some(1), "{args:?}: {message}");
         assert!(message.contains(told), "{args:?}: {message}");
     }
+}
+
+/// Commands that write a file, but for its name.
+const OUTPUTS: [&[&str]; 13] = [
+    &["live", "--port", "/dev/null", "--json", "--record"],
+    &["live", "--simulate", "--seconds", "1", "--json", "--stream"],
+    &["live", "--simulate", "--seconds", "1", "--json", "--mcap"],
+    &["live", "--simulate", "2", "--seconds", "1", "--json", "--record"],
+    &["record", "--simulate", "--seconds", "1"],
+    &["recording", "cut", RECORDING, "--out"],
+    &["recording", "merge", RECORDING, RECORDING, "--out"],
+    &["export", RECORDING, "--to", "csv", "--out"],
+    &["reconstruct", RECORDING, "--out"],
+    &["detector", "show", "--svg"],
+    &["detector", "compile", "--out"],
+    &["forward", "--save-jacobian"],
+    &["calibrate", "rub", "--simulate", "--out"],
+];
+
+/// A recording of some frames.
+const RECORDING: &str = "taken.tactomo";
+
+#[test]
+fn no_output_replaces_a_file_and_each_says_so_with_the_same_words() {
+    let folder = Folder::new("outputs");
+    let run = |args: &[&str], out: &str| {
+        let output = TACTOMO.command().current_dir(folder.path("")).args(args).arg(out).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    assert_eq!(run(&["record", "--simulate", "--seconds", "0.2"], RECORDING).0, Some(0));
+    folder.with("there.csv", "precious");
+    for args in OUTPUTS {
+        for (out, told) in [
+            ("there.csv", "there.csv exists already, and no file is replaced: give another name, or remove it first"),
+            ("none/a.csv", "cannot write none/a.csv: there is no folder none; make it first"),
+        ] {
+            let (code, message) = run(args, out);
+            assert_eq!(code, Some(1), "{args:?} {out}: {message}");
+            assert!(message.contains(told), "{args:?} {out}: {message}");
+            assert_eq!(message.matches("exists").count(), usize::from(told.contains("exists")), "{args:?}: {message}");
+        }
+    }
+    assert_eq!(std::fs::read_to_string(folder.path("there.csv")).unwrap(), "precious");
+    let left = std::fs::read_dir(folder.path("")).unwrap().count();
+    assert_eq!(left, 2, "nothing but what was there");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told_with_the_file_and_what_to_do() {
+    let folder = Folder::new("full");
+    let taken = folder.path(RECORDING);
+    TACTOMO.succeeds(&["record", &taken, "--simulate", "--seconds", "0.5"]);
+    let export = |form| vec!["export", &taken, "--solver", "contacts", "--to", form];
+    for args in [
+        export("csv"),
+        export("jsonl"),
+        export("npz"),
+        export("mcap"),
+        [export("mcap"), vec!["--profile", "ros2"]].concat(),
+        vec!["recording", "merge", &taken, &taken],
+        vec!["recording", "cut", &taken],
+    ] {
+        let (code, message) = TACTOMO.failure(&[&args[..], &["--out", "/dev/full"]].concat());
+        assert_eq!(code, Some(1), "{args:?}: {message}");
+        let told = "error: cannot write /dev/full: the disk is full; make room on it, or write to another one";
+        assert!(message.lines().last() == Some(told), "{args:?}: {message}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_terminal_that_is_closed_ends_a_recording_in_good_order() {
+    let folder = Folder::new("hangup");
+    let file = folder.path(RECORDING);
+    let mut child = TACTOMO.command().args(["record", &file, "--simulate"]).spawn().unwrap();
+    let begun = std::time::Instant::now();
+    while std::fs::metadata(&file).map_or(0, |file| file.len()) < 100_000 {
+        assert!(begun.elapsed() < std::time::Duration::from_secs(60), "nothing is recorded");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let kill = |signal: &str| std::process::Command::new("kill").args([signal, &child.id().to_string()]).status();
+    // A shell and the system may both tell of one terminal.
+    assert!(kill("-HUP").unwrap().success());
+    drop(kill("-HUP"));
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert!(
+        String::from_utf8(TACTOMO.succeeds(&["recording", "check", &file])).unwrap().contains("nothing is missing")
+    );
 }
 
 /// Runs a command whose stdout, or stderr, or both are pipes that nobody reads any more.
@@ -235,9 +324,6 @@ fn a_flat_detector_is_compiled_into_a_table() {
     let table = std::fs::read(&file).unwrap();
     assert_eq!((told["bytes"].as_u64(), told["electrodes"].as_u64()), (Some(table.len() as u64), Some(16)));
     assert!(table.starts_with(b"TCtb"), "{:?}", &table[..4]);
-    assert!(TACTOMO.refused(&compile).contains("--overwrite"));
-    assert_eq!(TACTOMO.json(&[&compile[..], &["--overwrite"]].concat()), told);
-    assert_eq!(std::fs::read(&file).unwrap(), table);
     let curved = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/detectors/fingertip.toml");
     let none = folder.path("curved.table");
     let why = TACTOMO.refused(&["detector", "compile", curved, "--out", &none]);
@@ -386,6 +472,81 @@ fn boards_that_are_recorded_in_a_folder_are_cut_and_shown_again_as_one() {
     assert!(all.iter().zip(&cut).all(|(all, cut)| *cut > 20 && cut < all), "{all:?} {cut:?}");
     let (names, code, messages) = patches_of(&piece);
     assert_eq!((names.join(" "), code), ("board-1 board-2".to_owned(), Some(0)), "{messages}");
+}
+
+#[cfg(unix)]
+#[test]
+fn of_a_folder_of_recordings_no_link_is_followed_and_nothing_acts() {
+    use std::os::unix::fs::symlink;
+
+    let folder = Folder::new("foreign");
+    let [taken, piece, out] = ["taken", "piece", "out.tactomo"].map(|name| folder.path(name));
+    TACTOMO.succeeds(&["live", "--simulate", "2", "--seconds", "0.5", "--json", "--record", &taken]);
+    let skin = format!("{taken}/skin.toml");
+    let sound = std::fs::read_to_string(&skin).unwrap();
+    let acting = sound.replacen("[[patch]]", &format!("[[patch]]\nrecord = \"{out}\""), 1);
+    std::fs::write(&skin, acting).unwrap();
+    let refused = TACTOMO.refused(&["live", "--skin", &taken, "--seconds", "0.5", "--json"]);
+    assert!(refused.contains("patch board-1 of ") && refused.contains("\"record\""), "{refused}");
+    assert!(!std::path::Path::new(&out).exists());
+    let secret = folder.with("secret", &sound);
+    let cut = ["recording", "cut", &taken, "--out", &piece];
+    std::fs::remove_file(&skin).unwrap();
+    symlink(&secret, &skin).unwrap();
+    assert!(TACTOMO.refused(&cut).contains("it is a link"));
+    std::fs::remove_file(&skin).unwrap();
+    let recording = format!("{taken}/board-1.tactomo");
+    std::fs::rename(&recording, &out).unwrap();
+    symlink(&out, &recording).unwrap();
+    assert!(TACTOMO.refused(&cut).contains("it is a link"));
+    assert!(!std::path::Path::new(&piece).exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn files_without_end_are_refused_by_their_formats_limit() {
+    let zeros = "/dev/zero";
+    let live = ["live", "--simulate", "--json", "--seconds", "0.5"];
+    for (args, told) in [
+        (&["live", "--json", "--skin", zeros][..], "a skin's file"),
+        (&[&live[..], &["--jacobian", zeros]].concat(), "a Jacobian"),
+        (&[&live[..], &["--learned", zeros]].concat(), "`tactomo-lab learn`"),
+        (&["forward", "--touches", zeros], "a list of touches"),
+        (&["board", "table", "--simulate", "--file", zeros], "a table of a detector"),
+    ] {
+        let (code, message) = TACTOMO.failure(args);
+        assert!(code != Some(0) && message.contains(told) && message.contains("zero"), "{args:?}: {message}");
+    }
+}
+
+#[test]
+fn a_table_is_checked_before_a_board_hears_of_it() {
+    let folder = Folder::new("table");
+    let [whole, small] = ["whole.table", "small.table"].map(|name| folder.path(name));
+    TACTOMO.succeeds(&["detector", "compile", "square-60", "--out", &whole]);
+    TACTOMO.succeeds(&["detector", "compile", "display-140x70", "--out", &small]);
+    let bytes = std::fs::read(&whole).unwrap();
+    let changed = |at: usize| [&bytes[..at], &[bytes[at] ^ 1], &bytes[at + 1..]].concat();
+    // A port that is none: nothing is said there.
+    let given = |file: &str, to: &[&str]| TACTOMO.run(&[&["board", "table", "--file", file], to].concat());
+    for (bytes, told) in [
+        (changed(0), "no table of a detector"),
+        (changed(4), "version"),
+        (changed(bytes.len() / 2), "checksum"),
+        (bytes[..bytes.len() - 9].to_vec(), "bytes where"),
+        ([&bytes[..], &[0]].concat(), "bytes"),
+        (Vec::new(), "no table of a detector"),
+    ] {
+        let output = given(&folder.with("damaged.table", bytes), &["--port", "/no/such/port"]);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(1) && message.contains("damaged.table"), "{message}");
+        assert!(message.contains(told) && !message.contains("/no/such/port"), "{told}: {message}");
+    }
+    let output = given(&small, &["--simulate", "--board", "ideal"]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && message.contains("the table is of"), "{message}");
+    let output = given(&whole, &["--simulate", "--board", "ideal"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use tactomo::board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo::board::source::Opened;
 use tactomo::detector::Detector;
-use tactomo::run::calibration::Learning;
+use tactomo::run::calibration::{Keeping, Learning};
 use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
 use tactomo::run::{Listener, Snapshot, TouchEvent};
 use tactomo::scene::{Hand, Scene, SceneName};
@@ -56,11 +56,18 @@ impl Sensor {
         std::fs::create_dir_all(&folder).unwrap();
         let description = Detector::preset(Detector::DEFAULT).unwrap();
         let scene = Scene::new(SceneName::Wandering, &description, Hand::relative(&description), SEED);
-        Self { scene, learning: Learning::of(&description, Some(&folder.join("mine.toml"))).unwrap() }
+        Self { scene, learning: Learning::of(&description, Keeping::In(folder.join("mine.learned.toml"))).unwrap() }
     }
 
     fn file(&self) -> PathBuf {
-        self.learning.file.clone().unwrap()
+        match &self.learning.keeping {
+            Keeping::In(file) => file.clone(),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn kept(&self) -> Detector {
+        Detector::read(&self.file()).unwrap()
     }
 
     /// A run on a detector as built, until something is learned that was not before, if it is waited for, and a while longer: the answers from
@@ -72,12 +79,11 @@ impl Sensor {
         let board = SimulatedBoard::simulate(description, simulation, options).unwrap();
         let scene_clock = board.scene_clock();
         let kept = Arc::new(Mutex::new(Vec::new()));
-        let detector = self.learning.kept().unwrap().unwrap_or_else(|| description.clone());
-        let solving = Solving::new(Method::Auto, Problem::of(&detector).unwrap());
+        let solving = Solving::new(Method::Auto, Problem::of(description).unwrap());
         let options = RunOptions {
             solving: Some(Solving { learning: Some(self.learning.clone()), ..solving }),
             listeners: vec![Box::new(Keeper(Arc::clone(&kept)))],
-            ..RunOptions::new(detector)
+            ..RunOptions::new(description.clone())
         };
         let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
         let (_requests, requests) = mpsc::sync_channel(1);
@@ -132,12 +138,12 @@ fn wait_for_file(file: &PathBuf, snapshots: &watch::Receiver<Arc<Snapshot>>) {
 fn what_presses_teaches_the_detector_for_the_next_time_too_until_it_is_another_sensor() {
     let sensor = Sensor::new();
     sensor.assert_right(&sensor.answers(BUILT, true));
-    let first = sensor.learning.kept().unwrap().expect("it is kept");
+    let first = sensor.kept();
     let again = sensor.answers(BUILT, false);
     assert!(again.0.learned.is_some(), "it begins with what is kept");
     sensor.assert_right(&again);
     sensor.assert_right(&sensor.answers(OTHER_BUILT, true));
-    let other = sensor.learning.kept().unwrap().expect("it is kept");
+    let other = sensor.kept();
     assert!(other.electrodes != first.electrodes && other.layers != first.layers, "it is learned anew");
     std::fs::remove_dir_all(sensor.file().parent().unwrap()).unwrap();
 }

@@ -8,6 +8,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use tactomo::board::record::{RecordReader, RecordWriter};
 
 use tactomo_tests::{Folder, TACTOMO};
 
@@ -127,6 +128,42 @@ fn pieces_are_cut_joined_checked_and_solved() {
     assert_eq!(checked.status.code(), Some(1));
     let said = String::from_utf8_lossy(&checked.stdout);
     assert!(said.contains("damaged in 1 place") && said.contains("16 bytes before its start do not belong"), "{said}");
+}
+
+/// The same recording, but that a byte was changed on the line, before the recording was written.
+fn changed_on_the_line(from: &Path, to: &Path) {
+    let mut reader = RecordReader::open(from).unwrap();
+    let mut writer = RecordWriter::new(std::fs::File::create_new(to).unwrap(), reader.header()).unwrap();
+    let (mut bytes, mut chunks) = (Vec::new(), 0);
+    while let Some(time_us) = reader.next_into(&mut bytes).unwrap() {
+        chunks += 1;
+        if chunks == 30 {
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 0x10;
+        }
+        writer.write(time_us, &bytes).unwrap();
+    }
+    writer.flush().unwrap();
+    assert!(chunks > 30, "{chunks}");
+}
+
+#[test]
+fn what_was_lost_on_the_line_damages_no_file_and_what_is_not_there_is_not_damaged() {
+    let folder = Folder::new("lost");
+    let [whole, noisy] = ["whole.tactomo", "noisy.tactomo"].map(|name| file(&folder, name));
+    recorded(&whole, "1");
+    changed_on_the_line(&whole, &noisy);
+    let checked = run(&["recording", "check"], &[&whole, &noisy]);
+    let said = String::from_utf8_lossy(&checked.stdout);
+    assert_eq!(checked.status.code(), Some(0), "{said}");
+    assert!(said.contains("corrupt, lost on the line; the file is whole"), "{said}");
+    let noisy = info(&noisy);
+    assert!(noisy["is_damaged"] == false && noisy["corrupt"].as_u64() > Some(0), "{noisy}");
+    let checked = run(&["recording", "check"], &[&whole, &file(&folder, "none.tactomo")]);
+    let [told, error] = [&checked.stdout, &checked.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    assert_eq!(checked.status.code(), Some(1));
+    assert!(told.contains("none.tactomo: No such file") && error.contains("1 of 2 cannot be read"), "{told} {error}");
+    assert!(!told.contains("damaged") && !error.contains("damaged"), "{told} {error}");
 }
 
 #[test]

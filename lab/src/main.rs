@@ -16,12 +16,12 @@ mod live;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::CommandFactory;
 
 #[global_allocator]
 static ALLOCATOR: heap::Counting = heap::Counting;
 
 fn main() -> ExitCode {
-    let cli = commands::Cli::parse();
+    let cli: commands::Cli = tactomo_cli::options::read(commands::Cli::command());
     tactomo_cli::run(|| commands::run(cli))
 }

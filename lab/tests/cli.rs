@@ -17,6 +17,8 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
     for (args, named) in [
         (&["study", "contacts", "--scenes", "0"][..], "--scenes"),
         (&["tradeoff", "--scan", "--solver", "auto"], "--solver"),
+        (&["live", "--seconds", "-1"], "invalid value '-1' for '--seconds <SECONDS>': a time (s) from"),
+        (&["design", "--smallest", "1e308"], "a force (N) from 0.000001 to 10000"),
         (&["dance"], "dance"),
     ] {
         let (code, message) = LAB.failure(args);
@@ -28,12 +30,18 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
 #[test]
 fn what_fails_exits_with_1_and_says_what_to_do() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
-    let exists = "exists already: give another name, or --overwrite";
+    let exists = "exists already, and no file is replaced: give another name, or remove it first";
     for (args, named) in [
         (&["tradeoff", "--quick", "--out", file][..], exists),
         (&["tradeoff", "--quick", "--picture", file], exists),
         (&["stability", "--quick", "--out", file], exists),
-        (&["stability", "--quick", "--out", "no/such/a.html"], "cannot write no/such/a.html: No such file"),
+        (
+            &["stability", "--quick", "--out", "no/such/a.html"],
+            "cannot write no/such/a.html: there is no folder no/such; make it first",
+        ),
+        (&["stability", "--quick", "--csv", file], exists),
+        (&["live", "--csv", file], exists),
+        (&["live", "--scene", "single", "--scan", "99"], "--scan 99, scene single: there is no electrode 99"),
     ] {
         let message = LAB.refused(args);
         assert!(message.contains(named), "{args:?}: {message}");

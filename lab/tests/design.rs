@@ -24,7 +24,6 @@ fn materials_give_json_csv_and_a_page() {
     let written = std::fs::read_to_string(&page).unwrap();
     assert!(written.contains("<svg") && written.contains("the paper says") && !written.contains("http"));
     assert_eq!(std::fs::read_to_string(&csv).unwrap().lines().count(), 1 + 10 + 4);
-    assert!(refused(&["study", "materials", "--out", &page]).contains("--overwrite"));
 }
 
 #[test]

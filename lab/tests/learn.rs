@@ -24,7 +24,7 @@ fn csv(range: std::ops::Range<usize>, channels: [usize; 3]) -> String {
 fn what_is_learned_is_kept_scored_and_used() {
     let folder = Folder::new("learn");
     let presses = folder.with("presses.csv", csv(0..150, [0, 1, 2]));
-    let model = folder.path("skin.safetensors");
+    let model = folder.path("sensor.safetensors");
     let learned = LAB.json(&["learn", &presses, "--out", &model, "--json"]);
     assert_eq!((&learned["channels"], &learned["strength"]), (&Value::from(3), &Value::from("depth_m")));
     // In another order of the columns.
@@ -75,7 +75,7 @@ fn presses_at_places_of_others_are_told_to_teach_nothing() {
 fn what_cannot_be_is_told() {
     let folder = Folder::new("learn-wrong");
     let presses = folder.with("presses.csv", csv(0..60, [0, 1, 2]));
-    let model = folder.path("skin.safetensors");
+    let model = folder.path("sensor.safetensors");
     LAB.json(&["learn", &presses, "--out", &model, "--json"]);
     let other = folder.with("other.csv", csv(0..60, [0, 1, 2]).replacen("a,b,c", "a,left,c", 1));
     assert!(LAB.refused(&["score", &model, &other]).contains("are missing: b"));

@@ -4,6 +4,9 @@
 //! [frame](crate::frame) that is not coded: board and host remember of each row the last one. A coded frame names its key, so one that is lost
 //! costs itself alone, unless it was a key.
 //!
+//! Numbers of frames begin anew after 65535. So a key is forgotten as soon as frames have gone by that it is too old for, and never looked at later,
+//! when its number might be that of another one.
+//!
 //! | bytes | what |
 //! |---|---|
 //! | 8 | as of a [frame](crate::frame), but with `k` in place of the width less one |
@@ -22,6 +25,9 @@ use crate::{MAX_ELECTRODES, MAX_READINGS, Scope};
 
 /// Bytes of the age of a key.
 pub(crate) const AGE_BYTES: usize = 1;
+/// Longest time between two frames after which keys still count (us): 65536 frames, after which numbers begin anew, would have 61 us each in it, and
+/// the fastest board takes longer than that for a row (docs/firmware.md).
+const LONGEST_GAP_US: u32 = 4_000_000;
 /// So many ones tell that the whole number follows.
 const ESCAPE: u32 = 8;
 /// Bits of a `z`: those of a difference of two readings of 16 bits.
@@ -38,6 +44,8 @@ const MOST_K: u32 = 15;
 #[derive(Clone, Debug)]
 pub struct Keys<const READINGS: usize> {
     electrodes: u8,
+    /// Number and board time (us) of the last frame, coded or not.
+    last: Option<(u16, u32)>,
     /// Ground by ground, every electrode.
     readings: [u16; READINGS],
     rows: [Option<Row>; MAX_ELECTRODES],
@@ -64,7 +72,7 @@ pub(crate) struct Written {
 
 impl<const READINGS: usize> Default for Keys<READINGS> {
     fn default() -> Self {
-        Self { electrodes: 0, readings: [0; READINGS], rows: [None; MAX_ELECTRODES] }
+        Self { electrodes: 0, last: None, readings: [0; READINGS], rows: [None; MAX_ELECTRODES] }
     }
 }
 
@@ -74,8 +82,21 @@ impl<const READINGS: usize> Keys<READINGS> {
         self.rows = [None; MAX_ELECTRODES];
     }
 
-    /// Remembers a frame that was sent, or came, as it is. One of more readings than there is room for is no key.
+    /// Takes note of a frame that is sent, or came: keys that are too old for it are forgotten, all of them where nobody can tell how many frames have
+    /// gone by. To be called with each frame, coded or not.
+    pub(crate) fn pass(&mut self, head: &FrameHead) {
+        let follows = |(sequence, time_us): (u16, u32)| {
+            age_of(head, sequence).is_some() && head.time_us.wrapping_sub(time_us) <= LONGEST_GAP_US
+        };
+        let counts = self.last.is_none_or(follows);
+        self.last = Some((head.sequence, head.time_us));
+        self.rows.iter_mut().for_each(|row| *row = row.filter(|key| counts && age_of(head, key.sequence).is_some()));
+    }
+
+    /// Remembers a frame that is sent, or came, as it is. One of another number of electrodes makes all before it be forgotten; one of more readings
+    /// than there is room for is no key.
     pub fn remember(&mut self, head: &FrameHead, scope: &Scope, readings: &[u16]) {
+        self.pass(head);
         if scope.electrodes() != self.electrodes {
             self.clear();
             self.electrodes = scope.electrodes();
@@ -101,15 +122,15 @@ impl<const READINGS: usize> Keys<READINGS> {
         }
     }
 
-    /// The number of a frame less that of its key; `None` if its rows are not all of one key frame, of the same readings and fraction bits, 1 to
-    /// 255 frames before.
+    /// The number of a frame that [passes](Self::pass) less that of its key; `None` if its rows are not all of one key frame, of the same readings and
+    /// fraction bits, 1 to 255 frames before.
     pub(crate) fn age(&self, head: &FrameHead, scope: &Scope) -> Option<u8> {
         let of = |at: usize| *self.rows.get(usize::from(scope.ground(at)))?;
         let key = of(0)?;
         let fits = scope.electrodes() == self.electrodes
             && (key.reads, key.fraction_bits) == (scope.reads(), head.fraction_bits)
             && (1..scope.rows()).all(|at| of(at) == Some(key));
-        u8::try_from(head.sequence.wrapping_sub(key.sequence)).ok().filter(|age| fits && *age > 0)
+        age_of(head, key.sequence).filter(|age| fits && *age > 0)
     }
 
     /// The age of the key by which a frame is to be coded; `None` if it has none, or is to be a key again: of whole frames each 32nd is, and of frames of
@@ -166,6 +187,11 @@ impl<const READINGS: usize> Keys<READINGS> {
             }
         }
     }
+}
+
+/// How many frames before this one the frame of this number was, modulo 65536; `None` if more than 255.
+fn age_of(head: &FrameHead, sequence: u16) -> Option<u8> {
+    u8::try_from(head.sequence.wrapping_sub(sequence)).ok()
 }
 
 /// The readings of each row, with the electrode that is grounded.

@@ -196,11 +196,9 @@ impl Contacts {
             return None;
         }
         let (head, _) = FrameHead::from_bytes(*head);
-        Some(Self {
-            head: FrameHead { fraction_bits: 0, ..head },
-            flags: ContactFlags(last & !COUNT),
-            found: contacts.iter().map(|bytes| ContactCode::from_bytes(*bytes)).collect(),
-        })
+        let found: Vec<_, MAX_CONTACTS> = contacts.iter().map(|bytes| ContactCode::from_bytes(*bytes)).collect();
+        let head = FrameHead { fraction_bits: 0, ..head };
+        found.iter().all(|contact| contact.id > 0).then_some(Self { head, flags: ContactFlags(last & !COUNT), found })
     }
 }
 

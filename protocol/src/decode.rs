@@ -6,7 +6,7 @@ use crate::coded::Keys;
 use crate::contacts::Contacts;
 use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Fault, Hello, Kind, Log, Request};
-use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_READINGS, MAX_WIRE, OLDEST, Scope, VERSION, cobs};
+use crate::{CODED_SINCE, CRC, CRC_BYTES, MAX_COMMAND, MAX_READINGS, MAX_WIRE, OLDEST, Scope, VERSION, cobs};
 
 /// Why bytes between two zeros are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -20,6 +20,9 @@ pub enum DecodeError {
     /// A whole packet of a frame whose [key](crate::coded) did not come.
     #[error("a frame whose key frame did not come")]
     Key,
+    /// A whole packet of a frame, or of contacts, that came before.
+    #[error("a frame that came before")]
+    Repeated,
     /// A whole packet whose kind or body breaks the rules of the protocol.
     #[error("a whole packet that breaks the rules of the protocol")]
     Body,
@@ -32,6 +35,8 @@ pub struct Counters {
     pub messages: u64,
     /// Whole frames whose key did not come: after a key that was lost, and before the first.
     pub without_key: u64,
+    /// Frames and contacts that came once more.
+    pub repeated: u64,
     /// Stretches of bytes between two zeros that were not a message.
     pub corrupt: u64,
     /// Bytes in those stretches.
@@ -52,7 +57,16 @@ pub struct Receiver<const N: usize> {
 #[derive(Debug, Default)]
 pub struct BoardReceiver {
     receiver: Receiver<MAX_WIRE>,
+    known: Known,
+}
+
+/// What a host's receiver knows of what came before.
+#[derive(Debug, Default)]
+struct Known {
     keys: Keys<MAX_READINGS>,
+    /// Number and board time of the last frame, and of the last contacts.
+    frame: Option<(u16, u32)>,
+    contacts: Option<(u16, u32)>,
 }
 
 /// The board's receiver.
@@ -113,6 +127,7 @@ impl<const N: usize> Receiver<N> {
         match packet {
             Ok(_) => self.counters.messages += 1,
             Err(DecodeError::Key) => self.counters.without_key += 1,
+            Err(DecodeError::Repeated) => self.counters.repeated += 1,
             Err(_) => {
                 self.counters.corrupt += 1;
                 self.counters.dropped_bytes += length as u64;
@@ -125,8 +140,8 @@ impl BoardReceiver {
     /// Takes bytes from the front of `input` up to the end of the next packet or stretch of junk; `None` when `input` is
     /// used up.
     pub fn receive(&mut self, input: &mut &[u8]) -> Option<Result<BoardMessage, DecodeError>> {
-        let Self { receiver, keys } = self;
-        receiver.receive_with(input, |packet| board_message(packet, keys))
+        let Self { receiver, known } = self;
+        receiver.receive_with(input, |packet| board_message(packet, known))
     }
 
     /// What was received and dropped so far.
@@ -156,23 +171,30 @@ fn open(packet: &[u8]) -> Result<(u8, u8, &[u8]), DecodeError> {
     }
 }
 
-fn board_message(packet: &[u8], keys: &mut Keys<MAX_READINGS>) -> Result<BoardMessage, DecodeError> {
+fn board_message(packet: &[u8], known: &mut Known) -> Result<BoardMessage, DecodeError> {
     let (version, kind, body) = open(packet)?;
     Ok(match Kind::from_bits(kind).ok_or(DecodeError::Body)? {
         Kind::Hello => {
             let hello = hello(body)?;
             // A board that has just started numbers its frames anew.
             if hello.answers == 0 {
-                keys.clear();
+                known.keys.clear();
+                (known.frame, known.contacts) = (None, None);
             }
             BoardMessage::Hello(hello)
         }
         Kind::Frame => {
             let frame = frame(body).ok_or(DecodeError::Body)?;
-            keys.remember(&frame.head, &frame.scope, &frame.readings);
+            known.keys.remember(&frame.head, &frame.scope, &frame.readings);
+            first(&mut known.frame, &frame.head)?;
             BoardMessage::Frame(frame)
         }
-        Kind::CodedFrame => BoardMessage::Frame(coded_frame(body, keys)?),
+        Kind::CodedFrame if version < CODED_SINCE => return Err(DecodeError::Body),
+        Kind::CodedFrame => {
+            let frame = coded_frame(body, &mut known.keys)?;
+            first(&mut known.frame, &frame.head)?;
+            BoardMessage::Frame(frame)
+        }
         Kind::Log => BoardMessage::Log(log(body)?),
         Kind::Fault => match from_postcard(body)? {
             // Its frames could be read, but it obeys nobody of this version.
@@ -180,10 +202,24 @@ fn board_message(packet: &[u8], keys: &mut Keys<MAX_READINGS>) -> Result<BoardMe
             fault => BoardMessage::Fault(fault),
         },
         Kind::Clock => BoardMessage::Clock(from_postcard(body)?),
-        Kind::Contacts => BoardMessage::Contacts(Contacts::read(body).ok_or(DecodeError::Body)?),
+        Kind::Contacts => {
+            let contacts = Contacts::read(body).ok_or(DecodeError::Body)?;
+            first(&mut known.contacts, &contacts.head)?;
+            BoardMessage::Contacts(contacts)
+        }
         Kind::Table => BoardMessage::Table(from_postcard(body)?),
         Kind::Command => return Err(DecodeError::Body),
     })
+}
+
+/// Takes note of a scan, unless it is the last one once more: no two have the same number and time.
+fn first(last: &mut Option<(u16, u32)>, head: &FrameHead) -> Result<(), DecodeError> {
+    let scan = Some((head.sequence, head.time_us));
+    if *last == scan {
+        return Err(DecodeError::Repeated);
+    }
+    *last = scan;
+    Ok(())
 }
 
 fn hello(body: &[u8]) -> Result<Hello, DecodeError> {
@@ -196,7 +232,10 @@ fn log(body: &[u8]) -> Result<Log, DecodeError> {
 }
 
 fn request(packet: &[u8]) -> Result<Request, DecodeError> {
-    let (_, kind, body) = open(packet)?;
+    let (version, kind, body) = open(packet)?;
+    if version != VERSION {
+        return Err(DecodeError::Version(version));
+    }
     if kind != Kind::Command as u8 {
         return Err(DecodeError::Body);
     }
@@ -222,13 +261,14 @@ fn frame(body: &[u8]) -> Option<Frame> {
     Some(Frame { head, scope, readings })
 }
 
-fn coded_frame(body: &[u8], keys: &Keys<MAX_READINGS>) -> Result<Frame, DecodeError> {
+fn coded_frame(body: &[u8], keys: &mut Keys<MAX_READINGS>) -> Result<Frame, DecodeError> {
     let split = || {
         let (head, rest) = body.split_first_chunk::<HEAD_BYTES>()?;
         let (age, rest) = rest.split_first()?;
         Some((FrameHead::from_bytes(*head), *age, Scope::read(rest)?))
     };
     let ((head, k), age, (scope, bytes)) = split().filter(|(_, age, _)| *age > 0).ok_or(DecodeError::Body)?;
+    keys.pass(&head);
     if keys.age(&head, &scope) != Some(age) {
         return Err(DecodeError::Key);
     }

@@ -45,6 +45,9 @@ pub enum EncodeError {
     /// The tag 0, which means that nobody asked.
     #[error("a command needs a tag other than 0")]
     Tag,
+    /// A contact with the number 0.
+    #[error("a contact needs a number other than 0")]
+    ContactNumber,
 }
 
 /// Encodes a board's message into `out`, the closing zero included; returns its length in bytes.
@@ -113,6 +116,7 @@ pub fn encode_keyed<const READINGS: usize>(
     out: &mut [u8],
 ) -> Result<usize, EncodeError> {
     check(head, scope, readings)?;
+    keys.pass(&head);
     if let Some(length) = encode_coded(head, scope, readings, keys, out) {
         return Ok(length);
     }
@@ -159,8 +163,11 @@ fn check(head: FrameHead, scope: &Scope, readings: &[u16]) -> Result<(), EncodeE
 /// Encodes contacts into `out`; returns the packet's length in bytes.
 ///
 /// # Errors
-/// [`EncodeError::Full`] if `out` is too short.
+/// [`EncodeError::Full`] if `out` is too short, [`EncodeError::ContactNumber`] if a contact has the number 0.
 pub fn encode_contacts(contacts: &Contacts, out: &mut [u8]) -> Result<usize, EncodeError> {
+    if contacts.found.iter().any(|contact| contact.id == 0) {
+        return Err(EncodeError::ContactNumber);
+    }
     write(Kind::Contacts, contacts.byte_count(), out, |body| contacts.write(body))
 }
 

@@ -70,10 +70,12 @@ pub use message::{
 };
 pub use scope::{MAX_PLAN_ROWS, MAX_ROWS, Plan, Scope};
 
-/// Version of the protocol that this crate speaks: 1 to 15. Boards and hosts refuse later ones, and those before [`OLDEST`].
+/// Version of the protocol that this crate speaks: 1 to 15. A board obeys no other; a host takes those from [`OLDEST`] on too.
 pub const VERSION: u8 = 4;
-/// Oldest version that is taken: it has no coded frames, and nothing else that is different.
+/// Oldest version of which a host takes what a board says, and recordings. Before [`CODED_SINCE`] there are no coded frames; nothing else is different.
 pub const OLDEST: u8 = 3;
+/// First version with [coded frames](coded).
+const CODED_SINCE: u8 = 4;
 /// Most electrodes that a frame can carry.
 pub const MAX_ELECTRODES: usize = 32;
 /// Fewest electrodes that a frame can carry.

@@ -17,16 +17,22 @@ use crate::table::{MAX_ELECTRODES, Table};
 const DAMPING: f32 = 1e-3;
 const LEAST_NEW: f32 = 0.02;
 
-/// Where one more contact would explain most of what contacts that are fitted leave of a frame; nowhere, if they are not determined. Counts the looks.
+/// Places that are looked at in one piece of work: with what is got ready for them, as many operations as two looks at three contacts.
+const A_PIECE: usize = 40;
+
+/// Takes the places among some where one more contact would explain most of what contacts that are fitted leave of a frame among the best, and counts the looks;
+/// returns the number of the place to go on at, if there is one. None are taken where the contacts are not determined.
 pub(crate) fn beside(
     Task { table, frame, errors }: Task<'_>,
     circuit: &Circuit,
     normal: &Normal,
+    from: usize,
+    best: &mut Candidates,
     work: &mut Working<'_>,
-) -> Candidates {
+) -> Option<usize> {
     let (head, n) = (table.head(), table.electrodes());
-    let Some(factor) = Factor::of(normal, DAMPING) else { return Candidates::default() };
-    // Large: it is made where it stays, for a board's stack has no room for two.
+    let factor = Factor::of(normal, DAMPING)?;
+    // Large: it is made where it stays, for a board's stack has no room for two, and its state for none.
     let weight = 1.0 / errors.variance_v2;
     let mut beside = Beside { table, circuit, factor, weight, rows: [Row::NONE; MAX_ELECTRODES] };
     let mut volts = [0.0; MAX_ELECTRODES];
@@ -36,7 +42,7 @@ pub(crate) fn beside(
         row.slopes = RowSlopes::new(circuit, g, head.drive_v, head.radius_m);
         row.sum_up(circuit, g, head.radius_m, n);
     }
-    beside.candidates(work)
+    beside.look_from(from, best, work)
 }
 
 /// What is left of a frame by contacts, ready for looks at more.
@@ -131,8 +137,8 @@ impl Row {
     /// Sums up the derivatives by the parameters of contacts.
     fn sum_up(&mut self, circuit: &Circuit, g: usize, unit_m: f32, n: usize) {
         for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-            let known = |values: &PerElectrode| (0..n).filter(|e| self.known >> e & 1 == 1).map(|e| values[e]).sum();
-            let by_share = |values: &PerElectrode| (0..n).map(|e| self.shares[e] * values[e]).sum();
+            let known = |values: &[f32]| (0..n).filter(|e| self.known >> e & 1 == 1).map(|e| values[e]).sum();
+            let by_share = |values: &[f32]| (0..n).map(|e| self.shares[e] * values[e]).sum();
             let alike = Pattern::of(one, unit_m, known);
             let by_share = Pattern::of(one, unit_m, by_share);
             let mut by_pad = Pattern::NONE;
@@ -152,11 +158,11 @@ impl Row {
 }
 
 impl Beside<'_, '_> {
-    fn candidates(&self, work: &mut Working<'_>) -> Candidates {
+    fn look_from(&self, from: usize, best: &mut Candidates, work: &mut Working<'_>) -> Option<usize> {
         let (table, head) = (self.table, self.table.head());
-        let mut all = Candidates::default();
         let (mut fields_ohm, mut potentials_ohm) = ([0.0; MAX_ELECTRODES], [0.0; MAX_ELECTRODES]);
-        for (i, j) in places(table) {
+        let mut looks = 0;
+        for (number, (i, j)) in places(table).enumerate().skip(from) {
             let at_m = table.middle_m(i, j);
             let is_free = |spot: &Spot| {
                 let [x, y] = [0, 1].map(|d| at_m[d] - spot.at_m[d]);
@@ -166,6 +172,10 @@ impl Beside<'_, '_> {
             if !table.holds(at_m[0], at_m[1]) || !there.all(is_free) {
                 continue;
             }
+            if looks == A_PIECE {
+                return Some(number);
+            }
+            looks += 1;
             work.looked();
             let own_ohm = table.rough(i, j, &mut fields_ohm);
             self.circuit.potentials_ohm(table, at_m, &fields_ohm, &mut potentials_ohm);
@@ -173,10 +183,10 @@ impl Beside<'_, '_> {
             if along > 0.0 && square > 0.0 {
                 let ln_ohm = held_ohm(libm::logf((square / along).max(own_ohm)), table);
                 let gain = self.weight * along * along / square;
-                take(&mut all, Candidate { spot: Spot { at_m, ln_ohm, ln_radius: 0.0 }, gain }, APART * head.radius_m);
+                take(best, Candidate { spot: Spot { at_m, ln_ohm, ln_radius: 0.0 }, gain }, APART * head.radius_m);
             }
         }
-        all
+        None
     }
 
     /// Scalar product of what is left with what a siemens at a place with these potentials would change, and the square of that but for what the contacts that there
@@ -237,7 +247,7 @@ impl Beside<'_, '_> {
             return;
         }
         for (k, one) in self.circuit.loaded.iter().enumerate().take(self.circuit.count) {
-            let sum = |values: &PerElectrode| unknown.clone().map(|e| apart[e] * values[e]).sum();
+            let sum = |values: &[f32]| unknown.clone().map(|e| apart[e] * values[e]).sum();
             let pattern = Pattern::of(one, self.table.head().radius_m, sum);
             let share = -row.slopes.per_ohm * per_ohm;
             add(shared, k, share, pattern.changes_ohm(&row.slopes.own[k], one));

@@ -40,7 +40,7 @@ const OWN_ERROR: f32 = 0.03;
 const CROWDING_STEPS: usize = 3;
 /// Share of a number by which it is changed for a derivative.
 const STEP: f32 = 0.01;
-/// Changes of what drives the couples of currents.
+/// Changes of what drives the couples of currents: of its two parts by a place's two and by the radius, less one that two have in common.
 pub(crate) const TURNED: usize = 5;
 /// Largest conductance of a contact (sheet conductances): what is firmer makes no difference.
 const FIRMEST_SHEETS: f32 = 300.0;
@@ -90,6 +90,8 @@ impl Disc {
 #[derive(Clone, Debug)]
 pub(crate) struct Loaded {
     pub spot: Spot,
+    /// Of its place. Once currents are known, what turns its slopes is, of electrodes, the moment times the derivatives of what drives the couples: of that along x by x,
+    /// by y (or of that along y by x), of that along y by y, in usual radii; then of both by the radius' logarithm.
     pub sample: Sample,
     /// Derivatives of the electrodes' fields by the logarithm of the radius (ohm).
     pub by_radius_ohm: PerElectrode,
@@ -117,9 +119,6 @@ pub(crate) struct Loaded {
     pub slopes_ohm_per_m: [PerElectrode; 2],
     /// Slopes that drive the couples of currents (ohm/m): those less half of the slope of the contact's own field.
     pub driving_ohm_per_m: [PerElectrode; 2],
-    /// The moment times the derivatives of those: of the slope along x by x, by y (or of that along y by x), of that along y by y, in usual radii; then of both by the
-    /// radius' logarithm.
-    pub turned: [PerElectrode; TURNED],
 }
 
 impl Loaded {
@@ -139,7 +138,6 @@ impl Loaded {
         currents: [0.0; MAX_ELECTRODES],
         slopes_ohm_per_m: [[0.0; MAX_ELECTRODES]; 2],
         driving_ohm_per_m: [[0.0; MAX_ELECTRODES]; 2],
-        turned: [[0.0; MAX_ELECTRODES]; TURNED],
     };
 
     /// Puts a contact there.
@@ -177,17 +175,15 @@ impl Loaded {
 
     /// Finds what drives the couples of currents at an electrode, and how that changes.
     fn drive(&mut self, head: &Head, n: usize, e: usize) {
-        let (sample, half) = (&self.sample, 0.5 * self.currents[e]);
+        let half = 0.5 * self.currents[e];
         for d in 0..2 {
-            self.driving_ohm_per_m[d][e] = self.slopes_ohm_per_m[d][e] - half * sample.slope[d][n];
+            self.driving_ohm_per_m[d][e] = self.slopes_ohm_per_m[d][e] - half * self.sample.slope[d][n];
         }
         let by_place = self.moment_s_m2 * head.radius_m;
         let by_radius = self.moment_s_m2 * self.per_ln_radius;
-        for (turned, bend) in self.turned.iter_mut().zip(&sample.bend) {
-            turned[e] = by_place * (bend[e] - half * bend[n]);
-        }
-        for (turned, slope) in self.turned[sample.bend.len()..].iter_mut().zip(&sample.wider_slope) {
-            turned[e] = by_radius * (slope[e] - half * slope[n]);
+        let units = [by_place, by_place, by_place, by_radius, by_radius];
+        for (turning, unit) in self.sample.turning.iter_mut().zip(units) {
+            turning[e] = unit * (turning[e] - half * turning[n]);
         }
     }
 

@@ -1,5 +1,6 @@
 //! What a table says of places: fields of discs, fields between them, and forces.
 
+use crate::circuit::TURNED;
 use crate::head::Head;
 use crate::spline::{interval, weights};
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, OTHERS, QUANTITIES, RADII, Table};
@@ -11,21 +12,18 @@ pub(crate) struct Sample {
     pub value: [f32; QUANTITIES],
     /// Derivatives by x and y (1/m).
     pub slope: [[f32; QUANTITIES]; 2],
-    /// Second derivatives by x twice, by x and y, by y twice (1/m2).
-    pub bend: [[f32; QUANTITIES]; 3],
     /// Values of the wide disc less those of the small one.
     pub wider: [f32; QUANTITIES],
-    /// Derivatives of that by x and y (1/m).
-    pub wider_slope: [[f32; QUANTITIES]; 2],
+    /// Derivatives of the slopes: second derivatives by x twice, by x and y, by y twice (1/m2); then the derivatives of `wider` by x and y (1/m).
+    pub turning: [[f32; QUANTITIES]; TURNED],
 }
 
 impl Sample {
     pub const NONE: Self = Self {
         value: [0.0; QUANTITIES],
         slope: [[0.0; QUANTITIES]; 2],
-        bend: [[0.0; QUANTITIES]; 3],
         wider: [0.0; QUANTITIES],
-        wider_slope: [[0.0; QUANTITIES]; 2],
+        turning: [[0.0; QUANTITIES]; TURNED],
     };
 }
 
@@ -62,12 +60,14 @@ impl<'a> Table<'a> {
                     sample.value[index] += value * code;
                     sample.slope[0][index] += slope_x * code;
                     sample.slope[1][index] += slope_y * code;
-                    for (sum, bend) in sample.bend.iter_mut().zip(bend) {
+                    let (bends, widened) = sample.turning.split_at_mut(bend.len());
+                    for (sum, bend) in bends.iter_mut().zip(bend) {
                         sum[index] += bend * code;
                     }
                     sample.wider[index] += value * (large - small);
-                    sample.wider_slope[0][index] += slope_x * (large - small);
-                    sample.wider_slope[1][index] += slope_y * (large - small);
+                    for (sum, slope) in widened.iter_mut().zip([slope_x, slope_y]) {
+                        sum[index] += slope * (large - small);
+                    }
                 }
             }
         }

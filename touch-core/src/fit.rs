@@ -1,8 +1,8 @@
-//! Damped Gauss-Newton steps of contacts to the readings of a frame.
+//! Damped Gauss-Newton steps of contacts to the readings of a frame, one look at them at a time.
 
 use crate::circuit::{Circuit, MAX_CONTACTS, Spot};
-use crate::frame::{Errors, Frame};
-use crate::normal::{Normal, PARAMETERS, Vector};
+use crate::normal::{ANY_RADIUS, Normal, PARAMETERS, Vector};
+use crate::solver::Task;
 use crate::table::Table;
 
 /// Longest way in a step, in usual radii, and longest change of a logarithm.
@@ -14,11 +14,11 @@ const LEAST_GAIN: f32 = 0.1;
 const FIRST_DAMPING: f32 = 1e-3;
 const LEAST_DAMPING: f32 = 1e-5;
 const DAMPING_STEP: f32 = 10.0;
-const TRIES: usize = 4;
+const TRIES: u8 = 4;
 /// Radii, as logarithms over the usual one: from a fifth of it to three times it.
-const LN_RADII: [f32; 2] = [-1.6, 1.1];
+pub(crate) const LN_RADII: [f32; 2] = [-1.6, 1.1];
 /// Resistances, as logarithms of those of a square of the layer: a contact of 1e-6 squares is nothing, and none leads better than a fifth of one.
-const LN_SQUARES: [f32; 2] = [-3.0, 13.8];
+pub(crate) const LN_SQUARES: [f32; 2] = [-3.0, 13.8];
 
 /// Contacts of a scene, [`MAX_CONTACTS`] at most.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -74,29 +74,14 @@ pub(crate) fn held_ohm(ln_ohm: f32, table: &Table<'_>) -> f32 {
     ln_ohm.max(square + LN_SQUARES[0]).min(square + LN_SQUARES[1])
 }
 
-/// Contacts fitted to a frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Fit {
-    pub scene: Scene,
-    pub normal: Normal,
-    /// Whether it is known that one more contact beside these would not be worth its price.
-    pub is_alone: bool,
-}
-
-/// Work under way.
+/// What was done so far.
 pub(crate) struct Working<'a> {
-    /// What was done so far.
-    pub done: Work,
+    pub done: &'a mut Work,
     /// Called after each piece of it.
-    attend: &'a mut dyn FnMut(),
+    pub attend: &'a mut dyn FnMut(),
 }
 
-impl<'a> Working<'a> {
-    /// Nothing is done yet.
-    pub fn new(attend: &'a mut dyn FnMut()) -> Self {
-        Self { done: Work::default(), attend }
-    }
-
+impl Working<'_> {
     /// The readings of so many contacts and their derivatives were worked out.
     fn worked_out(&mut self, contacts: usize) {
         self.done.frames[contacts - 1] += 1;
@@ -106,6 +91,7 @@ impl<'a> Working<'a> {
     /// A place was looked at for a first contact.
     pub fn looked_at_first(&mut self) {
         self.done.first_looks += 1;
+        (self.attend)();
     }
 
     /// A place was looked at for one more contact.
@@ -113,17 +99,6 @@ impl<'a> Working<'a> {
         self.done.looks += 1;
         (self.attend)();
     }
-}
-
-/// What fits need.
-pub(crate) struct Fitter<'a, 't, 'w> {
-    pub table: &'a Table<'t>,
-    pub frame: &'a Frame<'a>,
-    pub errors: &'a Errors,
-    pub circuit: &'a mut Circuit,
-    pub work: &'a mut Working<'w>,
-    /// Standard deviation of the logarithms of radii.
-    pub radius_deviation: f32,
 }
 
 /// What an answer took.
@@ -137,45 +112,131 @@ pub struct Work {
     pub looks: u32,
 }
 
-impl Fitter<'_, '_, '_> {
-    /// What a scene leaves of the frame; `false` if it makes no sense.
-    fn look(&mut self, scene: &Scene, normal: &mut Normal) -> bool {
-        if scene.count == 0 || !self.circuit.solve(self.table, scene.spots()) {
-            return false;
-        }
-        normal.sum_up(self.table, self.circuit, self.frame, self.errors, self.radius_deviation);
-        self.work.worked_out(scene.count);
-        normal.objective().is_finite()
+/// Contacts that were fitted to a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fit {
+    pub scene: Scene,
+    /// Sum of squares of what they leave, and the same with what was known of radii before.
+    pub cost: f32,
+    pub objective: f32,
+    /// What the readings say for each contact (squared deviations).
+    pub information: [f32; MAX_CONTACTS],
+    /// Standard deviation of the logarithms of radii that they were fitted with.
+    pub radius_deviation: f32,
+    /// Whether it is known that one more contact beside these would not be worth its price.
+    pub is_alone: bool,
+}
+
+impl Fit {
+    /// No contact.
+    pub const NONE: Self = Self {
+        scene: Scene::EMPTY,
+        cost: 0.0,
+        objective: 0.0,
+        information: [0.0; MAX_CONTACTS],
+        radius_deviation: ANY_RADIUS,
+        is_alone: false,
+    };
+}
+
+/// How a fit goes on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Went {
+    /// It has not ended.
+    On,
+    /// It has ended: with this, or with nothing if the scene makes no sense.
+    ToEnd(Option<Fit>),
+}
+
+/// A fit under way.
+#[derive(Clone, Debug)]
+pub(crate) struct Fitting {
+    scene: Scene,
+    /// Of the scene.
+    pub normal: Normal,
+    /// What is looked at next.
+    trial: Scene,
+    radius_deviation: f32,
+    damping: f32,
+    /// Steps that it may still take, and tries of the next one so far.
+    steps: u8,
+    tries: u8,
+    has_looked: bool,
+}
+
+impl Fitting {
+    /// One that has nothing to do.
+    pub const NONE: Self = Self {
+        scene: Scene::EMPTY,
+        normal: Normal::EMPTY,
+        trial: Scene::EMPTY,
+        radius_deviation: ANY_RADIUS,
+        damping: FIRST_DAMPING,
+        steps: 0,
+        tries: 0,
+        has_looked: false,
+    };
+
+    /// Begins to step from a scene to where it fits best, so many steps at most.
+    pub fn begin(&mut self, scene: Scene, radius_deviation: f32, steps: u8) {
+        (self.scene, self.trial, self.radius_deviation) = (scene, scene, radius_deviation);
+        (self.damping, self.steps, self.tries, self.has_looked) = (FIRST_DAMPING, steps, 0, false);
     }
 
-    /// Steps from a scene to where it fits best, so many at most; `None` if it makes no sense.
-    pub fn fit(&mut self, scene: Scene, steps: usize) -> Option<Fit> {
-        let mut at = Fit { scene, normal: Normal::EMPTY, is_alone: false };
-        if !self.look(&scene, &mut at.normal) {
-            return None;
-        }
-        let mut damping = FIRST_DAMPING;
-        let mut trial = at;
-        for _ in 0..steps {
-            let mut tries = 0;
-            let taken = loop {
-                let Some((step, gain)) = at.normal.step(damping) else { break false };
-                if gain < LEAST_GAIN || tries == TRIES {
-                    break false;
-                }
-                trial.scene = at.scene.moved(&step, self.table);
-                if self.look(&trial.scene, &mut trial.normal) && trial.normal.objective() < at.normal.objective() {
-                    break true;
-                }
-                damping *= DAMPING_STEP;
-                tries += 1;
-            };
-            if !taken {
-                break;
+    /// Takes one look.
+    pub fn go_on(&mut self, task: Task<'_>, circuit: &mut Circuit, work: &mut Working<'_>) -> Went {
+        if !self.has_looked {
+            self.has_looked = true;
+            if !look(task, circuit, &self.trial, self.radius_deviation, &mut self.normal, work) {
+                return Went::ToEnd(None);
             }
-            at = trial;
-            damping = (damping / DAMPING_STEP).max(LEAST_DAMPING);
+        } else {
+            let mut normal = Normal::EMPTY;
+            let makes_sense = look(task, circuit, &self.trial, self.radius_deviation, &mut normal, work);
+            if makes_sense && normal.objective() < self.normal.objective() {
+                (self.scene, self.normal) = (self.trial, normal);
+                self.damping = (self.damping / DAMPING_STEP).max(LEAST_DAMPING);
+                (self.steps, self.tries) = (self.steps - 1, 0);
+            } else {
+                self.damping *= DAMPING_STEP;
+                self.tries += 1;
+            }
         }
-        Some(at)
+        let may_step = self.steps > 0 && self.tries < TRIES;
+        match self.normal.step(self.damping).filter(|(_, gain)| may_step && *gain >= LEAST_GAIN) {
+            Some((step, _)) => {
+                self.trial = self.scene.moved(&step, task.table);
+                Went::On
+            }
+            None => Went::ToEnd(Some(self.fit())),
+        }
     }
+
+    fn fit(&self) -> Fit {
+        Fit {
+            scene: self.scene,
+            cost: self.normal.cost,
+            objective: self.normal.objective(),
+            information: self.normal.information(),
+            radius_deviation: self.radius_deviation,
+            is_alone: false,
+        }
+    }
+}
+
+/// What a scene leaves of a frame; `false` if it makes no sense.
+fn look(
+    Task { table, frame, errors }: Task<'_>,
+    circuit: &mut Circuit,
+    scene: &Scene,
+    radius_deviation: f32,
+    normal: &mut Normal,
+    work: &mut Working<'_>,
+) -> bool {
+    if scene.count == 0 || !circuit.solve(table, scene.spots()) {
+        return false;
+    }
+    normal.sum_up(table, circuit, frame, errors, radius_deviation);
+    work.worked_out(scene.count);
+    normal.objective().is_finite()
 }

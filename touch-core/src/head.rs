@@ -2,7 +2,7 @@
 
 use core::f64::consts::PI;
 
-use crate::table::{Floats, RADII, TableError};
+use crate::table::{Floats, MOST, RADII, TableError};
 
 /// Numbers of a detector and its board.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -150,26 +150,35 @@ impl Head {
     }
 
     fn check(self) -> Result<Self, TableError> {
-        let above = |value: f32| value > 0.0 && value.is_finite();
-        let not_below = |value: f32| value >= 0.0 && value.is_finite();
-        let is_law = above(self.force_exponent) && not_below(self.force_ohm) && above(self.force_most_n);
+        // Beyond what any detector has, and so that no product of some of them is too large for a number.
+        let length = |value_m: f32| (1e-6..=100.0).contains(&value_m);
+        let volts = |value_v: f32| (1e-7..=1e4).contains(&value_v);
+        let ohm = |value_ohm: f32| (0.0..=MOST).contains(&value_ohm);
+        let share = |value: f32| (0.0..=100.0).contains(&value);
+        let conducts = |value: f32| (1e-9..=1e6).contains(&value);
+        let is_law = conducts(self.force_s)
+            && (0.1..=5.0).contains(&self.force_exponent)
+            && ohm(self.force_ohm)
+            && (1e-3..=1e4).contains(&self.force_most_n);
+        let is_in_reach = |value_m: f32| value_m.abs() <= 100.0;
+        let [small_m, wide_m] = self.radii_m;
         let all = [
-            ("place", self.left_m.is_finite() && self.bottom_m.is_finite()),
-            ("step of the grid", above(self.step_x_m) && above(self.step_y_m)),
-            ("usual radius", above(self.radius_m)),
-            ("radii", above(self.radii_m[0]) && above(self.radii_m[1] - self.radii_m[0])),
-            ("distances", above(self.near_m) && above(self.ln_step)),
-            ("drive", above(self.drive_v)),
-            ("on-resistance", not_below(self.on_resistance_ohm)),
-            ("noise", above(self.noise_v)),
-            ("error of the readings", not_below(self.model_share)),
-            ("errors of contacts", not_below(self.shift_m) && not_below(self.ln_conductance_error)),
-            ("error of pads", not_below(self.pad_share)),
-            ("full scale", above(self.full_v)),
-            ("sheet conductance", above(self.sheet_s)),
-            ("conductivity", above(self.top_s_per_m)),
-            ("constriction", above(self.constriction_ohm)),
-            ("law of force", not_below(self.force_s) && (!self.has_law() || is_law)),
+            ("place", is_in_reach(self.left_m) && is_in_reach(self.bottom_m)),
+            ("step of the grid", length(self.step_x_m) && length(self.step_y_m)),
+            ("usual radius", length(self.radius_m)),
+            ("radii", length(small_m) && length(wide_m) && wide_m > 1.01 * small_m),
+            ("distances", length(self.near_m) && (1e-3..=10.0).contains(&self.ln_step)),
+            ("drive", volts(self.drive_v)),
+            ("on-resistance", ohm(self.on_resistance_ohm)),
+            ("noise", volts(self.noise_v)),
+            ("error of the readings", share(self.model_share)),
+            ("errors of contacts", share(self.shift_m) && share(self.ln_conductance_error)),
+            ("error of pads", share(self.pad_share)),
+            ("full scale", volts(self.full_v)),
+            ("sheet conductance", conducts(self.sheet_s)),
+            ("conductivity", conducts(self.top_s_per_m)),
+            ("constriction", ohm(self.constriction_ohm)),
+            ("law of force", self.force_s == 0.0 || is_law),
         ];
         match all.iter().find(|(_, sound)| !sound) {
             Some((what, _)) => Err(TableError::Number { what }),

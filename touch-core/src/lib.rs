@@ -1,13 +1,13 @@
-//! Contacts of a tomographic tactile detector, from a table that it was compiled to: place, conductance and standard errors of up to three.
+#![doc = include_str!("../README.md")]
 //!
-//! For microcontrollers: no operating system, no allocation, `f32`. `tactomo detector compile` writes the [table] of any flat detector; it is
-//! read where it lies, in flash.
+//! # Parts
 //!
 //! - [`table`]: the format, and its reader; [`Contents`] writes it
 //! - [`spline`]: what its fields are interpolated with
 //! - `circuit`: readings of a few contacts, and their derivatives
 //! - `normal`, `fit`: least squares
 //! - `scan`, `beside`: where a first contact may be, and one more
+//! - `search`: what explains a frame that what was followed does not
 //! - [`Solver`]: contacts from frame to frame
 
 #![no_std]
@@ -29,6 +29,8 @@ mod fields;
 mod fit;
 mod frame;
 mod head;
+#[cfg(test)]
+mod laws;
 mod normal;
 #[cfg(test)]
 mod samples;
@@ -45,5 +47,5 @@ pub use self::circuit::MAX_CONTACTS;
 pub use self::contents::Contents;
 pub use self::fit::Work;
 pub use self::frame::{Frame, FrameError, Says};
-pub use self::solver::Solver;
+pub use self::solver::{MOST_PIECES, Solver};
 pub use self::table::{MAX_ELECTRODES, Table, TableError};

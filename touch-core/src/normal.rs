@@ -1,6 +1,6 @@
 //! Normal equations of contacts, summed up row by row of a frame, and steps by them.
 
-use crate::circuit::{Circuit, Loaded, MAX_CONTACTS, PerElectrode, TURNED};
+use crate::circuit::{Circuit, Loaded, MAX_CONTACTS, TURNED};
 use crate::frame::{Errors, Frame, left_v};
 use crate::table::{MAX_ELECTRODES, Table};
 
@@ -117,6 +117,17 @@ impl Normal {
         Some((step, gain))
     }
 
+    /// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that
+    /// of the derivative by its logarithm, or what others leave of that.
+    pub fn information(&self) -> [f32; MAX_CONTACTS] {
+        let covariance = self.covariance();
+        core::array::from_fn(|k| {
+            let strength = PARAMETERS * k + 2;
+            let left = covariance.as_ref().map_or(f32::INFINITY, |all| 1.0 / all[strength][strength]);
+            self.matrix[strength][strength].min(left)
+        })
+    }
+
     /// Covariance of the parameters; `None` where they are not determined.
     pub fn covariance(&self) -> Option<[Vector; MOST]> {
         let factor = Factor::of(self, 1e-6)?;
@@ -144,13 +155,13 @@ impl Pattern {
     pub const NONE: Self = Self { current: 0.0, along: [0.0; 3], driving: [0.0; 2], turned: [0.0; TURNED] };
 
     /// Of a contact, summed over electrodes by `sum`.
-    pub fn of(one: &Loaded, unit_m: f32, sum: impl Fn(&PerElectrode) -> f32) -> Self {
+    pub fn of(one: &Loaded, unit_m: f32, sum: impl Fn(&[f32]) -> f32) -> Self {
         let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| unit_m * sum(slopes));
         Self {
             current: sum(&one.currents),
             along: [x, y, sum(&one.by_radius_ohm)],
-            driving: one.driving_ohm_per_m.each_ref().map(&sum),
-            turned: one.turned.each_ref().map(&sum),
+            driving: one.driving_ohm_per_m.each_ref().map(|driving| sum(driving)),
+            turned: one.sample.turning.each_ref().map(|turning| sum(turning)),
         }
     }
 

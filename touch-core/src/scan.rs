@@ -29,6 +29,10 @@ pub(crate) struct Candidate {
 /// The best candidates, the best first; those that are not there gain nothing.
 pub(crate) type Candidates = [Candidate; CANDIDATES];
 
+/// None at all.
+pub(crate) const NO_CANDIDATES: Candidates =
+    [Candidate { spot: Spot { at_m: [0.0; 2], ln_ohm: 0.0, ln_radius: 0.0 }, gain: 0.0 }; CANDIDATES];
+
 /// Takes a candidate among the best, unless a better one is near.
 pub(crate) fn take(all: &mut Candidates, new: Candidate, apart_m: f32) {
     let is_near = |old: &Candidate| {

@@ -1,11 +1,10 @@
-//! The search for what explains a frame.
+//! The search for what explains a frame: what is to be done next, and what becomes of what was found by that. The work itself is the [solver](crate::Solver)'s,
+//! who does it piece by piece.
 
-use crate::beside::beside;
 use crate::circuit::MAX_CONTACTS;
-use crate::fit::{Fit, Scene, Working};
-use crate::normal::{ANY_RADIUS, PARAMETERS, USUAL_RADIUS};
-use crate::scan::{CANDIDATES, Candidates, first};
-use crate::solver::{PATIENCE, Solver, Task};
+use crate::fit::{Fit, Scene};
+use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
+use crate::scan::{CANDIDATES, Candidates, NO_CANDIDATES};
 
 /// Price of a parameter (squared deviations): that of the host's search.
 const PARAMETER_PRICE: f32 = 7.0;
@@ -20,161 +19,346 @@ const MISFIT_DEVIATIONS: f32 = 5.0;
 /// What the readings say for a contact whose strength they tell to 3 %: that one is there (squared deviations, one over the square of that).
 const SURE: f32 = 1000.0;
 /// Steps at most where a start is tried, and where the best of them is searched.
-const TRYING: usize = 8;
-const SEARCHING: usize = 20;
+const TRYING: u8 = 8;
+const SEARCHING: u8 = 20;
 
-impl Solver {
-    /// What explains a frame best, from what was followed, or from where one contact would explain most of it alone, if that is known; notes how well.
-    pub(crate) fn search(
-        &mut self,
-        from: Option<Fit>,
-        alone: Option<Candidates>,
-        task: Task<'_>,
-        work: &mut Working<'_>,
-    ) -> Option<Fit> {
-        let found = self.explanation(from, alone, task, work).and_then(|fit| self.pruned(fit, task, work));
-        let found = found.map(|fit| {
-            let fit = self.completed(fit, task, work);
-            let fit = self.exchanged(fit, task, work);
-            self.reduced(fit, task, work)
-        });
-        self.more &= found.is_some();
-        self.searched = found.map_or(0.0, |fit| fit.normal.cost);
-        let fits = found.is_none_or(|fit| !is_misfit(&fit, task.readings()));
-        self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
-        self.wait = if fits { 0 } else { self.patience };
-        found
-    }
+/// What a search needs done next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Wants {
+    /// A scene fitted, with a standard deviation of the logarithms of radii, in so many steps at most.
+    Fit(Scene, f32, u8),
+    /// The places for a first contact in [`Search::starts`].
+    First,
+    /// The places for one more beside a scene, which is looked at with such a standard deviation, there.
+    Beside(Scene, f32),
+    /// Nothing: this was found.
+    Nothing(Option<Fit>),
+}
 
-    /// The best explanation that is found step by step.
-    fn explanation(
-        &mut self,
-        from: Option<Fit>,
-        alone: Option<Candidates>,
-        task: Task<'_>,
-        work: &mut Working<'_>,
-    ) -> Option<Fit> {
-        let best = from.and_then(|from| self.grown(from, task, work));
-        // What there was more than is no place to go on from.
-        if !self.more && best.is_some_and(|best| !is_misfit(&best, task.readings())) {
-            return best;
-        }
-        let alone = alone.unwrap_or_else(|| first(task, work));
-        if alone[0].gain < FIRST_GAIN {
-            return best;
-        }
-        let starts = alone.map(|candidate| (candidate.gain > 0.0).then(|| Scene::default().with(candidate.spot)));
-        let one = self.best_of(&starts, USUAL_RADIUS, task, work);
-        better(best, one.and_then(|one| self.grown(one, task, work)))
-    }
+/// What a search waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Awaits {
+    /// What it grows from, fitted with any radii.
+    Grown,
+    /// Places for one more beside that.
+    More,
+    /// Places for a first contact.
+    First,
+    /// The fit of the start with this number, and of the best of them to its end.
+    Start(u8),
+    Best,
+    /// An explanation without the contact that the readings speak least for.
+    Pruned,
+    /// Places for one more beside an explanation.
+    Another,
+    /// The best explanation without the contact that is looked for anew, and without one that the others may do as well without.
+    Rest,
+    Fewer(u8),
+}
 
-    /// The best fit from some starts.
-    fn best_of(
-        &mut self,
-        starts: &[Option<Scene>; CANDIDATES],
-        radius_deviation: f32,
-        task: Task<'_>,
-        work: &mut Working<'_>,
-    ) -> Option<Fit> {
-        let mut best = None;
-        for start in starts.iter().flatten() {
-            best = better(best, self.fit(*start, radius_deviation, TRYING, task, work));
-            if best.is_some_and(|best: Fit| !is_misfit(&best, task.readings())) {
-                break;
+/// What an explanation is made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// What was followed.
+    Followed,
+    /// Nothing.
+    Nothing,
+    /// The best explanation but for one contact.
+    Rest,
+}
+
+/// A search, of which one piece after the other is done.
+#[derive(Clone, Debug)]
+pub(crate) struct Search {
+    awaits: Awaits,
+    from: Way,
+    /// What one more contact is looked for beside.
+    at: Fit,
+    /// Best explanation by what was made from here on.
+    best: Option<Fit>,
+    /// The best before that: by what was followed, or of all.
+    kept: Option<Fit>,
+    /// Best of some that are tried.
+    tried: Option<Fit>,
+    /// Where contacts may be.
+    pub starts: Candidates,
+    /// Whether one more is looked for beside a whole explanation, with any radii.
+    completes: bool,
+    /// Whether what was found leaves enough for another contact, and whether it did before one was looked for anew.
+    pub more: bool,
+    more_before: bool,
+    /// The contact that is looked for anew, and how many were.
+    contact: u8,
+    anew: u8,
+}
+
+impl Search {
+    /// None under way.
+    pub const NONE: Self = Self {
+        awaits: Awaits::First,
+        from: Way::Nothing,
+        at: Fit::NONE,
+        best: None,
+        kept: None,
+        tried: None,
+        starts: NO_CANDIDATES,
+        completes: false,
+        more: false,
+        more_before: false,
+        contact: 0,
+        anew: 0,
+    };
+
+    /// Looks for what explains a frame best, from what was followed, and from nothing; where one contact would explain most of it alone may be known.
+    pub fn begin(&mut self, followed: Option<Fit>, alone: Option<Candidates>, readings: f32) -> Wants {
+        (self.best, self.kept, self.tried) = (None, None, None);
+        self.from = Way::Followed;
+        match (followed, alone) {
+            (Some(fit), _) => self.grow(fit),
+            (None, None) => self.begin_from_nothing(),
+            (None, Some(alone)) => {
+                self.begin_from_nothing();
+                self.starts = alone;
+                self.placed(readings)
             }
         }
-        self.fit(best?.scene, radius_deviation, SEARCHING, task, work)
     }
 
-    /// The likeliest number of contacts from some that are found on, one more at a time.
-    fn grown(&mut self, from: Fit, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
-        let (mut at, mut best) = (from, None);
-        loop {
-            best = better(best, self.fit(at.scene, ANY_RADIUS, SEARCHING, task, work));
-            if at.scene.count == MAX_CONTACTS {
-                return best;
+    /// The best so far, where a search is to end early.
+    pub fn best_so_far(&self) -> Option<Fit> {
+        let at = Some(self.at).filter(|at| at.scene.count > 0);
+        better(self.kept, self.best).or(self.tried).or(at)
+    }
+
+    /// Takes the fit that it waited for.
+    pub fn fitted(&mut self, found: Option<Fit>, readings: f32) -> Wants {
+        match self.awaits {
+            Awaits::Grown => {
+                self.best = better(self.best, found);
+                if self.at.scene.count == MAX_CONTACTS {
+                    return self.grown(readings);
+                }
+                self.awaits = Awaits::More;
+                Wants::Beside(self.at.scene, self.at.radius_deviation)
             }
-            let candidates = self.beside(&at, task, work);
-            if candidates[0].gain <= PAID * PARAMETER_PRICE {
+            Awaits::Start(number) => {
+                self.tried = better(self.tried, found);
+                let next = usize::from(number) + 1;
+                let fits = self.tried.is_some_and(|tried| !is_misfit(&tried, readings));
+                if !fits && self.starts.get(next).is_some_and(|start| start.gain > 0.0) {
+                    return self.start(next);
+                }
+                let Some(tried) = self.tried else { return self.added(None, readings) };
+                self.awaits = Awaits::Best;
+                Wants::Fit(tried.scene, self.radius_deviation(), SEARCHING)
+            }
+            Awaits::Best => self.added(found, readings),
+            Awaits::Pruned => {
+                self.best = found;
+                self.prune(readings)
+            }
+            Awaits::Rest => match found {
+                Some(rest) => self.grow(rest),
+                None => self.exchanged(readings),
+            },
+            Awaits::Fewer(contact) => {
+                self.tried = better(self.tried, found);
+                self.leave_out_after(Some(contact))
+            }
+            Awaits::More | Awaits::First | Awaits::Another => Wants::Nothing(self.best_so_far()),
+        }
+    }
+
+    /// Takes the places that it waited for.
+    pub fn placed(&mut self, readings: f32) -> Wants {
+        let gain = self.starts[0].gain;
+        match self.awaits {
+            Awaits::More if gain <= PAID * PARAMETER_PRICE => {
                 // With any radii they leave still less.
-                return best.map(|best| Fit { is_alone: best.scene.count == at.scene.count, ..best });
+                let count = self.at.scene.count;
+                self.best = self.best.map(|best| Fit { is_alone: best.scene.count == count, ..best });
+                self.grown(readings)
             }
-            let starts = candidates.map(|one| (one.gain > PAID * PARAMETER_PRICE).then(|| at.scene.with(one.spot)));
-            let Some(more) = self.best_of(&starts, USUAL_RADIUS, task, work) else { return best };
-            at = more;
+            Awaits::More => self.start_above(PAID * PARAMETER_PRICE, false),
+            Awaits::First if gain < FIRST_GAIN => {
+                self.best = self.kept;
+                self.prune(readings)
+            }
+            Awaits::First => {
+                (self.at, self.best) = (Fit::NONE, None);
+                self.start_above(0.0, false)
+            }
+            Awaits::Another => {
+                self.more = gain > FIRST_GAIN;
+                let is_full = self.best.is_some_and(|best| best.scene.count == MAX_CONTACTS);
+                if self.more && !is_full { self.start_above(FIRST_GAIN, true) } else { self.completed(readings) }
+            }
+            _ => Wants::Nothing(self.best_so_far()),
         }
     }
 
-    /// Contacts with those that are looked for beside them as long as one would explain much of what they leave; notes whether another one would.
-    fn completed(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
-        loop {
-            let candidates = if best.is_alone { Candidates::default() } else { self.beside(&best, task, work) };
-            self.more = candidates[0].gain > FIRST_GAIN;
-            if !self.more || best.scene.count == MAX_CONTACTS {
-                return best;
+    fn begin_from_nothing(&mut self) -> Wants {
+        (self.from, self.awaits) = (Way::Nothing, Awaits::First);
+        Wants::First
+    }
+
+    /// Looks for the likeliest number of contacts from some that are found on, one more at a time.
+    fn grow(&mut self, from: Fit) -> Wants {
+        self.best = None;
+        self.grow_on(from)
+    }
+
+    fn grow_on(&mut self, at: Fit) -> Wants {
+        (self.at, self.awaits) = (at, Awaits::Grown);
+        Wants::Fit(at.scene, ANY_RADIUS, SEARCHING)
+    }
+
+    /// No more contacts are worth their price.
+    fn grown(&mut self, readings: f32) -> Wants {
+        match self.from {
+            Way::Followed => {
+                // What there was more than is no place to go on from.
+                if !self.more && self.best.is_some_and(|best| !is_misfit(&best, readings)) {
+                    return self.prune(readings);
+                }
+                self.kept = self.best;
+                self.begin_from_nothing()
             }
-            let starts = candidates.map(|one| (one.gain > FIRST_GAIN).then(|| best.scene.with(one.spot)));
-            let new = self.best_of(&starts, ANY_RADIUS, task, work);
-            match new.filter(|new| score(new) < score(&best)) {
-                Some(new) => best = new,
-                None => return best,
+            Way::Nothing => {
+                self.best = better(self.kept, self.best);
+                self.prune(readings)
+            }
+            Way::Rest => self.prune(readings),
+        }
+    }
+
+    /// Tries one more contact at the places where it gains more than this.
+    fn start_above(&mut self, least_gain: f32, completes: bool) -> Wants {
+        self.starts.iter_mut().filter(|start| start.gain <= least_gain).for_each(|start| start.gain = 0.0);
+        (self.completes, self.tried) = (completes, None);
+        self.start(0)
+    }
+
+    fn start(&mut self, number: usize) -> Wants {
+        const { assert!(CANDIDATES <= u8::MAX as usize) };
+        self.awaits = Awaits::Start(number as u8);
+        let others = if self.completes { self.best.unwrap_or(Fit::NONE) } else { self.at };
+        let scene = self.starts.get(number).map_or(others.scene, |start| others.scene.with(start.spot));
+        Wants::Fit(scene, self.radius_deviation(), TRYING)
+    }
+
+    fn radius_deviation(&self) -> f32 {
+        if self.completes { ANY_RADIUS } else { USUAL_RADIUS }
+    }
+
+    /// One more contact was found, or none.
+    fn added(&mut self, found: Option<Fit>, readings: f32) -> Wants {
+        if !self.completes {
+            return match found {
+                Some(more) => self.grow_on(more),
+                None => self.grown(readings),
+            };
+        }
+        let is_better = |new: &Fit| self.best.is_none_or(|best| score(new) < score(&best));
+        match found.filter(is_better) {
+            Some(new) => {
+                self.best = Some(new);
+                self.complete(readings)
+            }
+            None => self.completed(readings),
+        }
+    }
+
+    /// Leaves out the contacts that the readings do not speak for.
+    fn prune(&mut self, readings: f32) -> Wants {
+        match self.best {
+            None if self.from == Way::Rest => self.exchanged(readings),
+            None => self.nothing_found(),
+            Some(best) => match weakest(&best) {
+                Some(gone) => {
+                    self.awaits = Awaits::Pruned;
+                    Wants::Fit(best.scene.without(gone), ANY_RADIUS, SEARCHING)
+                }
+                None => self.complete(readings),
+            },
+        }
+    }
+
+    fn nothing_found(&mut self) -> Wants {
+        self.more = false;
+        Wants::Nothing(None)
+    }
+
+    /// Looks for one more contact beside an explanation, as long as that would explain much of what they leave; notes whether another one would.
+    fn complete(&mut self, readings: f32) -> Wants {
+        match self.best {
+            Some(best) if !best.is_alone => {
+                self.awaits = Awaits::Another;
+                Wants::Beside(best.scene, best.radius_deviation)
+            }
+            _ => {
+                self.more = false;
+                self.completed(readings)
             }
         }
     }
 
-    /// Contacts that leave too much, with each in turn looked for anew beside the others: one that went astray early is held there by those that came after it.
+    fn completed(&mut self, readings: f32) -> Wants {
+        if self.from == Way::Rest {
+            return self.exchanged(readings);
+        }
+        self.kept = self.best;
+        (self.from, self.contact, self.anew) = (Way::Rest, 0, 0);
+        self.exchange(readings)
+    }
+
+    /// Looks for one contact of an explanation that leaves too much anew beside the others: one that went astray early is held there by those that came after it.
     /// As often as there are contacts at most; and where there are more than can be told, it is not for the search that they leave too much.
-    fn exchanged(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
-        let (mut k, mut tried) = (0, 0);
-        while tried < best.scene.count && self.is_to_be_mended(&best, task) {
-            k %= best.scene.count;
-            tried += 1;
-            let before = self.more;
-            let rest = self.fit(best.scene.without(k), USUAL_RADIUS, SEARCHING, task, work);
-            let new = rest.and_then(|rest| self.grown(rest, task, work)).and_then(|new| self.pruned(new, task, work));
-            let new = new.map(|new| self.completed(new, task, work));
-            match new.filter(|new| score(new) < score(&best) - PARAMETER_PRICE) {
-                Some(new) => best = new,
-                None => (k, self.more) = (k + 1, before),
-            }
+    fn exchange(&mut self, readings: f32) -> Wants {
+        let Some(kept) = self.kept else { return self.nothing_found() };
+        let count = kept.scene.count;
+        if usize::from(self.anew) >= count || !self.is_to_be_mended(&kept, readings) {
+            return self.leave_out_after(None);
         }
-        best
+        let contact = usize::from(self.contact) % count;
+        (self.contact, self.anew) = (contact as u8, self.anew + 1);
+        (self.more_before, self.awaits, self.best) = (self.more, Awaits::Rest, None);
+        Wants::Fit(kept.scene.without(contact), USUAL_RADIUS, SEARCHING)
     }
 
-    fn is_to_be_mended(&self, fit: &Fit, task: Task<'_>) -> bool {
+    fn exchanged(&mut self, readings: f32) -> Wants {
+        let is_better = |new: &Fit| self.kept.is_none_or(|kept| score(new) < score(&kept) - PARAMETER_PRICE);
+        match self.best.filter(is_better) {
+            Some(new) => self.kept = Some(new),
+            None => (self.contact, self.more) = (self.contact + 1, self.more_before),
+        }
+        self.exchange(readings)
+    }
+
+    fn is_to_be_mended(&self, fit: &Fit, readings: f32) -> bool {
         let is_beyond = self.more && fit.scene.count == MAX_CONTACTS;
-        !is_beyond && (self.more || is_misfit(fit, task.readings()))
+        !is_beyond && (self.more || is_misfit(fit, readings))
     }
 
-    /// Contacts without those that the others do as well without, once they are fitted anew: a second one that was found while the first was too small.
-    fn reduced(&mut self, mut best: Fit, task: Task<'_>, work: &mut Working<'_>) -> Fit {
-        while best.scene.count > 1 {
-            let mut fewer = None;
-            let all = information(&best);
-            for k in (0..best.scene.count).filter(|k| all[*k] < SURE) {
-                fewer = better(fewer, self.fit(best.scene.without(k), ANY_RADIUS, SEARCHING, task, work));
-            }
-            match fewer.filter(|fewer| score(fewer) < score(&best)) {
-                Some(fewer) => best = fewer,
-                None => return best,
-            }
+    /// Leaves out each contact after this one, if there is one, that the others may do as well without, once they are fitted anew: a second one that was found while
+    /// the first was too small. Then the explanation is the one with fewer that is better, if one is, and is looked through again.
+    fn leave_out_after(&mut self, contact: Option<u8>) -> Wants {
+        let Some(kept) = self.kept else { return self.nothing_found() };
+        if contact.is_none() {
+            self.tried = None;
         }
-        best
-    }
-
-    /// A fit without the contacts that the readings do not speak for; `None` if none is left.
-    pub(crate) fn pruned(&mut self, mut fit: Fit, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
-        while let Some(gone) = weakest(&fit) {
-            fit = self.fit(fit.scene.without(gone), ANY_RADIUS, SEARCHING, task, work)?;
+        let next = contact.map_or(0, |contact| usize::from(contact) + 1);
+        let is_unsure = |k: &usize| kept.scene.count > 1 && kept.information[*k] < SURE;
+        if let Some(next) = (next..kept.scene.count).find(is_unsure) {
+            self.awaits = Awaits::Fewer(next as u8);
+            return Wants::Fit(kept.scene.without(next), ANY_RADIUS, SEARCHING);
         }
-        Some(fit)
-    }
-
-    /// Where one more contact would explain most of what others leave.
-    fn beside(&mut self, fit: &Fit, task: Task<'_>, work: &mut Working<'_>) -> Candidates {
-        match self.circuit.solve(task.table, fit.scene.spots()) {
-            true => beside(task, &self.circuit, &fit.normal, work),
-            false => Candidates::default(),
+        match self.tried.filter(|fewer| score(fewer) < score(&kept)) {
+            Some(fewer) => {
+                self.kept = Some(fewer);
+                self.leave_out_after(None)
+            }
+            None => Wants::Nothing(Some(kept)),
         }
     }
 }
@@ -190,12 +374,12 @@ pub(crate) fn limit(freedom: f32) -> f32 {
 }
 
 pub(crate) fn is_misfit(fit: &Fit, readings: f32) -> bool {
-    fit.normal.cost > limit(readings - freedom(fit))
+    fit.cost > limit(readings - freedom(fit))
 }
 
 /// The sum of squares with the price of contacts: of two explanations the lower one is believed.
 fn score(fit: &Fit) -> f32 {
-    fit.normal.objective() + PARAMETER_PRICE * PAID * fit.scene.count as f32
+    fit.objective + PARAMETER_PRICE * PAID * fit.scene.count as f32
 }
 
 fn better(a: Option<Fit>, b: Option<Fit>) -> Option<Fit> {
@@ -206,19 +390,8 @@ fn better(a: Option<Fit>, b: Option<Fit>) -> Option<Fit> {
 }
 
 /// The contact that the readings speak least for, if that is less than its price.
-fn weakest(fit: &Fit) -> Option<usize> {
-    let all = information(fit);
+pub(crate) fn weakest(fit: &Fit) -> Option<usize> {
+    let all = &fit.information;
     let least = (0..fit.scene.count).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
     (all[least] < PAID * PARAMETER_PRICE).then_some(least)
-}
-
-/// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that
-/// of the derivative by its logarithm, or what others leave of that.
-fn information(fit: &Fit) -> [f32; MAX_CONTACTS] {
-    let covariance = fit.normal.covariance();
-    core::array::from_fn(|k| {
-        let strength = PARAMETERS * k + 2;
-        let left = covariance.as_ref().map_or(f32::INFINITY, |all| 1.0 / all[strength][strength]);
-        fit.normal.matrix[strength][strength].min(left)
-    })
 }

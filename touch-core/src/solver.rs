@@ -3,24 +3,31 @@
 //! What was found last is fitted again. Where that explains neither a frame nor the one before, more contacts are looked for beside it, and without it. One
 //! more is believed if it lowers the sum of squares by more than its parameters' price. What leaves too much is mended: one more where that would explain much,
 //! each in turn looked for anew beside the others, and one fewer where those that stay do as well.
+//!
+//! All that is done in pieces, each of which ends soon, so that whoever has something else to do between them can.
 
 use crate::answer::{Answer, Contact, Flags};
+use crate::beside::beside;
 use crate::circuit::{Circuit, MAX_CONTACTS};
-use crate::fit::{Fit, Fitter, Scene, Work, Working};
+use crate::fit::{Fit, Fitting, LN_RADII, LN_SQUARES, Scene, Went, Work, Working};
 use crate::frame::{Errors, Frame, FrameError, Says};
 use crate::normal::{ANY_RADIUS, MOST, PARAMETERS, Vector};
-use crate::scan::first;
-use crate::search::{FIRST_GAIN, freedom, is_misfit, limit};
+use crate::scan::{NO_CANDIDATES, first};
+use crate::search::{FIRST_GAIN, Search, Wants, freedom, is_misfit, limit, weakest};
 use crate::table::Table;
 
+/// Pieces of work that a search takes at most; one that is not done by then ends with the best that it has, and [misfit](Flags::MISFIT) is raised. Of 2400 frames of
+/// none to six contacts on a made-up sheet, searches that explain what three or fewer left took up to 300, those of random readings up to 1400.
+pub const MOST_PIECES: u32 = 400;
 /// What is followed explains a frame as long as its sum of squares is below this times what the search left: the host's.
 const WORSE: f32 = 1.3;
-/// Steps at most where contacts are followed.
-const FOLLOWING: usize = 4;
+/// Steps at most where contacts are followed, and where one that is gone is left out.
+const FOLLOWING: u8 = 4;
+const LEAVING_OUT: u8 = 20;
 /// Conductance (sheet conductances) above which more would change nothing.
 const SATURATED_SHEETS: f32 = 100.0;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
-pub(crate) const PATIENCE: [u32; 2] = [1, 64];
+const PATIENCE: [u32; 2] = [1, 64];
 
 /// Standard errors have to be above this times those by noise alone for a calibration to be worth it: the host's.
 const CALIBRATION_WORTH: f32 = 2.0;
@@ -41,20 +48,52 @@ impl Task<'_> {
     }
 }
 
+/// What is being made of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// There is no frame.
+    Idle,
+    /// What was found last is fitted to it, without what is no longer there.
+    Followed,
+    /// What was told before is looked at once more.
+    Kept,
+    /// It is searched.
+    Searched,
+    /// What the search has found is looked at once more.
+    Found,
+}
+
+/// What the next piece of work is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Piece {
+    /// A look of a fit.
+    Fit,
+    /// Places for a first contact.
+    First,
+    /// A look at contacts beside which one more is looked for; then places from this one on.
+    Others,
+    Beside(u16),
+}
+
 /// Finds contacts in frames, one after the other: those of one table.
 #[derive(Clone, Debug)]
 pub struct Solver {
-    pub(crate) circuit: Circuit,
+    circuit: Circuit,
+    fitting: Fitting,
+    search: Search,
+    stage: Stage,
+    piece: Piece,
+    /// Work on this frame so far; pieces of a search.
+    work: Work,
+    pieces: u32,
     scene: Scene,
     ids: [u32; MAX_CONTACTS],
     /// Numbers begin at 1.
     next_id: u32,
     /// What the last search left of a reading, and the frames that one that did not end well is not repeated for.
-    pub(crate) searched: f32,
-    /// Whether it left enough for another contact.
-    pub(crate) more: bool,
-    pub(crate) patience: u32,
-    pub(crate) wait: u32,
+    searched: f32,
+    patience: u32,
+    wait: u32,
     /// Whether the last frame was not explained by what was followed, or there was none.
     was_lost: bool,
 }
@@ -70,11 +109,16 @@ impl Solver {
     pub const fn new() -> Self {
         Self {
             circuit: Circuit::EMPTY,
+            fitting: Fitting::NONE,
+            search: Search::NONE,
+            stage: Stage::Idle,
+            piece: Piece::Fit,
+            work: Work { frames: [0; MAX_CONTACTS], first_looks: 0, looks: 0 },
+            pieces: 0,
             scene: Scene::EMPTY,
             ids: [0; MAX_CONTACTS],
             next_id: 1,
             searched: 0.0,
-            more: false,
             patience: PATIENCE[0],
             wait: 0,
             was_lost: true,
@@ -91,56 +135,148 @@ impl Solver {
     /// # Errors
     /// [`FrameError`] if it cannot be a frame of the table's detector.
     pub fn solve(&mut self, table: &Table<'_>, frame: &Frame<'_>) -> Result<Answer, FrameError> {
-        self.solve_while(table, frame, &mut || {})
+        self.stage = Stage::Idle;
+        loop {
+            if let Some(answer) = self.solve_in_pieces(table, frame, u32::MAX, &mut || {})? {
+                return Ok(answer);
+            }
+        }
     }
 
-    /// The contacts of a frame, where there is something else to attend to meanwhile: `attend` is called at least after every look at three contacts, or at
-    /// one place (some 100 000 floating-point operations).
+    /// Whether a frame is being worked on: [`solve_in_pieces`](Self::solve_in_pieces) goes on with it.
+    pub fn is_busy(&self) -> bool {
+        self.stage != Stage::Idle
+    }
+
+    /// Does so many pieces of the work on a frame, or fewer if it is done with fewer; the contacts once it is done. It is to be called with the same frame until then.
+    ///
+    /// No piece takes longer than two looks at three contacts, some 300 000 floating-point operations. A frame whose contacts are followed takes two to five, and
+    /// a search [`MOST_PIECES`] at most. During a piece `attend` is called after each look at contacts or at a place, for who has something else to attend to.
     ///
     /// # Errors
-    /// As for [`solve`](Self::solve).
-    pub fn solve_while(
+    /// [`FrameError`] if it cannot be a frame of the table's detector.
+    pub fn solve_in_pieces(
         &mut self,
         table: &Table<'_>,
         frame: &Frame<'_>,
+        pieces: u32,
         attend: &mut dyn FnMut(),
-    ) -> Result<Answer, FrameError> {
+    ) -> Result<Option<Answer>, FrameError> {
         frame.check(table)?;
         let (frame, left_out) = frame.without_broken(table);
-        let frame = &frame;
-        let task = Task { table, frame, errors: &Errors::of(frame, table) };
-        let mut work = Working::new(attend);
-        let before = self.scene;
-        let mut found = self.followed(task, &mut work);
+        let task = Task { table, frame: &frame, errors: &Errors::of(&frame, table) };
+        if self.stage == Stage::Idle {
+            (self.stage, self.work) = (Stage::Followed, Work::default());
+            self.fit(self.scene, ANY_RADIUS, FOLLOWING);
+        }
+        let answer = (0..pieces).find_map(|_| self.go_on(task, attend));
+        Ok(answer.map(|mut answer| {
+            answer.left_out = left_out;
+            answer.flags.raise(Flags::FAULT, left_out != 0);
+            answer
+        }))
+    }
+
+    /// Does a piece of work.
+    fn go_on(&mut self, task: Task<'_>, attend: &mut dyn FnMut()) -> Option<Answer> {
+        let readings = task.readings();
+        let mut work = Working { done: &mut self.work, attend };
+        let wants = match self.piece {
+            Piece::Fit => match self.fitting.go_on(task, &mut self.circuit, &mut work) {
+                Went::On => None,
+                Went::ToEnd(found) if self.stage == Stage::Searched => Some(self.search.fitted(found, readings)),
+                Went::ToEnd(found) => return self.fitted(found, task, attend),
+            },
+            Piece::First => {
+                self.search.starts = first(task, &mut work);
+                Some(self.search.placed(readings))
+            }
+            Piece::Others => match self.fitting.go_on(task, &mut self.circuit, &mut work) {
+                Went::ToEnd(Some(_)) => {
+                    self.piece = Piece::Beside(0);
+                    None
+                }
+                // Nothing can be said of what makes no sense.
+                _ => Some(self.search.placed(readings)),
+            },
+            Piece::Beside(from) => {
+                let (normal, starts) = (&self.fitting.normal, &mut self.search.starts);
+                match beside(task, &self.circuit, normal, from.into(), starts, &mut work) {
+                    Some(next) => {
+                        self.piece = Piece::Beside(next as u16);
+                        None
+                    }
+                    None => Some(self.search.placed(readings)),
+                }
+            }
+        };
+        if self.stage == Stage::Searched {
+            self.pieces += 1;
+            if self.pieces >= MOST_PIECES {
+                return self.found(self.search.best_so_far(), task);
+            }
+        }
+        wants.and_then(|wants| self.prepare(wants, task))
+    }
+
+    /// Prepares what a search wants done.
+    fn prepare(&mut self, wants: Wants, task: Task<'_>) -> Option<Answer> {
+        match wants {
+            Wants::Fit(scene, radius_deviation, steps) => self.fit(scene, radius_deviation, steps),
+            Wants::First => self.piece = Piece::First,
+            Wants::Beside(scene, radius_deviation) => {
+                self.fit(scene, radius_deviation, 0);
+                (self.search.starts, self.piece) = (NO_CANDIDATES, Piece::Others);
+            }
+            Wants::Nothing(found) => return self.found(found, task),
+        }
+        None
+    }
+
+    fn fit(&mut self, scene: Scene, radius_deviation: f32, steps: u8) {
+        self.fitting.begin(scene, radius_deviation, steps);
+        self.piece = Piece::Fit;
+    }
+
+    /// Takes a fit that is none of a search.
+    fn fitted(&mut self, found: Option<Fit>, task: Task<'_>, attend: &mut dyn FnMut()) -> Option<Answer> {
+        match (self.stage, found.and_then(|fit| Some((fit, weakest(&fit)?)))) {
+            (Stage::Followed, Some((fit, gone))) => {
+                self.fit(fit.scene.without(gone), ANY_RADIUS, LEAVING_OUT);
+                None
+            }
+            (Stage::Followed, None) => self.followed(found, task, attend),
+            (stage, _) => Some(self.end(found, stage == Stage::Kept, task)),
+        }
+    }
+
+    /// Decides what becomes of a frame by what was followed in it.
+    fn followed(&mut self, found: Option<Fit>, task: Task<'_>, attend: &mut dyn FnMut()) -> Option<Answer> {
         let readings = task.readings();
         // Nothing is left, or far less unexplained: what did not fit is gone.
-        let has_changed = found.is_none_or(|fit| self.more && WORSE * fit.normal.cost < self.searched);
+        let has_changed = found.is_none_or(|fit| self.search.more && WORSE * fit.cost < self.searched);
         if has_changed {
             self.wait = 0;
         }
         let most = |fit: &Fit| (WORSE * self.searched).max(limit(readings - freedom(fit)));
-        let alone = found.is_none().then(|| first(task, &mut work));
+        let alone = found.is_none().then(|| first(task, &mut Working { done: &mut self.work, attend }));
         let is_lost = match (&found, &alone) {
-            (Some(fit), _) => has_changed || fit.normal.cost > most(fit),
+            (Some(fit), _) => has_changed || fit.cost > most(fit),
             (None, alone) => alone.is_some_and(|alone| alone[0].gain >= FIRST_GAIN),
         };
-        self.more &= found.is_some();
-        let is_searched = is_lost && self.was_lost && self.may_search();
-        if is_searched {
-            found = self.search(found, alone, task, &mut work);
-        } else if is_lost && !self.was_lost {
-            // While something lands or lifts, rows are not those of one scene: what there was stays, and the next frame tells.
-            found = self.fit(before, ANY_RADIUS, 0, task, &mut work);
+        self.search.more &= found.is_some();
+        if is_lost && self.was_lost && self.may_search() {
+            (self.stage, self.pieces) = (Stage::Searched, 0);
+            let wants = self.search.begin(found, alone, readings);
+            return self.prepare(wants, task);
         }
-        // A search that ends well has nothing to wait for.
-        self.was_lost = is_lost && !(is_searched && self.wait == 0);
-        self.scene = found.map_or_else(Scene::default, |fit| fit.scene);
-        self.number(&before);
-        let mut answer = self.answer(found, task, work.done);
-        answer.left_out = left_out;
-        answer.flags.raise(Flags::FAULT, left_out != 0);
-        answer.flags.raise(Flags::MISFIT, is_lost && !is_searched);
-        Ok(answer)
+        if is_lost && !self.was_lost {
+            // While something lands or lifts, rows are not those of one scene: what there was stays, and the next frame tells.
+            self.stage = Stage::Kept;
+            self.fit(self.scene, ANY_RADIUS, 0);
+            return None;
+        }
+        Some(self.end(found, is_lost, task))
     }
 
     fn may_search(&mut self) -> bool {
@@ -149,22 +285,35 @@ impl Solver {
         may
     }
 
-    /// What was found last, fitted to this frame, without what is no longer there.
-    fn followed(&mut self, task: Task<'_>, work: &mut Working<'_>) -> Option<Fit> {
-        let fit = self.fit(self.scene, ANY_RADIUS, FOLLOWING, task, work)?;
-        self.pruned(fit, task, work)
+    /// Takes what a search has found; notes how well it explains the frame. One that was not ended did not end well.
+    fn found(&mut self, found: Option<Fit>, task: Task<'_>) -> Option<Answer> {
+        self.search.more &= found.is_some();
+        self.searched = found.map_or(0.0, |fit| fit.cost);
+        let fits = self.pieces < MOST_PIECES && found.is_none_or(|fit| !is_misfit(&fit, task.readings()));
+        self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
+        self.wait = if fits { 0 } else { self.patience };
+        self.stage = Stage::Found;
+        match found {
+            Some(fit) => {
+                self.fit(fit.scene, ANY_RADIUS, 0);
+                None
+            }
+            None => Some(self.end(None, false, task)),
+        }
     }
 
-    pub(crate) fn fit(
-        &mut self,
-        scene: Scene,
-        radius_deviation: f32,
-        steps: usize,
-        task: Task<'_>,
-        work: &mut Working<'_>,
-    ) -> Option<Fit> {
-        let Task { table, frame, errors } = task;
-        Fitter { table, frame, errors, circuit: &mut self.circuit, work, radius_deviation }.fit(scene, steps)
+    /// The answer, with what is the last fit if there is one.
+    fn end(&mut self, found: Option<Fit>, is_lost: bool, task: Task<'_>) -> Answer {
+        let is_searched = self.stage == Stage::Found;
+        // A search that ends well has nothing to wait for.
+        self.was_lost = if is_searched { self.wait > 0 } else { is_lost };
+        self.stage = Stage::Idle;
+        let before = self.scene;
+        self.scene = found.map_or(Scene::EMPTY, |fit| fit.scene);
+        self.number(&before);
+        let mut answer = self.answer(found, task);
+        answer.flags.raise(Flags::MISFIT, is_lost || is_searched && self.pieces >= MOST_PIECES);
+        answer
     }
 
     /// Gives contacts the numbers of the nearest ones before.
@@ -192,22 +341,22 @@ impl Solver {
         }
     }
 
-    fn answer(&mut self, found: Option<Fit>, task: Task<'_>, work: Work) -> Answer {
-        let mut answer = Answer::of(work);
+    fn answer(&mut self, found: Option<Fit>, task: Task<'_>) -> Answer {
+        let mut answer = Answer::of(self.work);
         answer.flags.raise(Flags::SATURATED, task.errors.is_full);
-        answer.flags.raise(Flags::MORE, self.more);
+        answer.flags.raise(Flags::MORE, self.search.more);
         let Task { table, frame, errors } = task;
         let readings = task.readings();
         let Some(fit) = found.filter(|fit| self.circuit.solve(task.table, fit.scene.spots())) else {
             let voltages = (0..frame.volts.len()).filter(|i| frame.says_at(*i) == Says::Voltage);
             let squares: f32 = voltages.map(|i| frame.volts[i] * frame.volts[i]).sum();
-            answer.residual = libm::sqrtf(squares / errors.variance_v2 / readings.max(1.0));
+            answer.residual = libm::sqrtf(squares / errors.variance_v2 / readings.max(1.0)).min(f32::MAX);
             return answer;
         };
         answer.flags.raise(Flags::MISFIT, is_misfit(&fit, readings));
         answer.flags.raise(Flags::CALIBRATE, is_to_be_calibrated(&fit, task));
-        answer.residual = libm::sqrtf(fit.normal.cost / readings.max(1.0));
-        let covariance = fit.normal.covariance();
+        answer.residual = libm::sqrtf(fit.cost.max(0.0) / readings.max(1.0));
+        let covariance = self.fitting.normal.covariance();
         let firmest_s = SATURATED_SHEETS * table.head().sheet_s;
         for k in 0..self.circuit.count {
             let contact = self.contact(k, table, covariance.as_ref());
@@ -221,11 +370,19 @@ impl Solver {
         let (loaded, radius_m) = (&self.circuit.loaded[k], table.head().radius_m);
         let first = PARAMETERS * k;
         let of = |i: usize, j: usize| covariance.map_or(f32::INFINITY, |all| all[first + i][first + j]);
-        let log_radius = libm::sqrtf(of(3, 3).max(0.0));
+        // What the readings do not tell is known as well as where a fit may go.
+        let deviation = |i: usize, most: f32| if of(i, i) >= 0.0 { libm::sqrtf(of(i, i)).min(most) } else { most };
+        let log_radius = deviation(3, LN_RADII[1] - LN_RADII[0]);
+        let [low_m, high_m] = table.bounds_m();
+        let size = [0, 1].map(|d| (high_m[d] - low_m[d]) / radius_m);
         let shift = table.head().shift_m / radius_m;
-        let [x, y] = [0, 1].map(|i| libm::sqrtf(of(i, i).max(0.0) + shift * shift));
+        let [x, y] = [0, 1].map(|i| {
+            let of_readings = deviation(i, size[i]);
+            libm::sqrtf(of_readings * of_readings + shift * shift)
+        });
         let of_detector = table.head().ln_conductance_error;
-        let variance = loaded.conductance_variance(table, radius_m, of) + of_detector * of_detector;
+        let most = LN_SQUARES[1] - LN_SQUARES[0];
+        let variance = loaded.conductance_variance(table, radius_m, of).min(most * most) + of_detector * of_detector;
         let conductance_s = loaded.conductance_s();
         let apparent_conductance_s = 1.0 / (loaded.share * loaded.ohm);
         Contact {
@@ -239,7 +396,7 @@ impl Solver {
             radius_m: loaded.radius_m,
             radius_sigma_m: loaded.radius_m * log_radius,
             sigma_m: [radius_m * x, radius_m * y],
-            correlation: if x * y > 0.0 { of(0, 1) / (x * y) } else { 0.0 },
+            correlation: Some(of(0, 1) / (x * y)).filter(|r| r.is_finite()).map_or(0.0, |r| r.clamp(-1.0, 1.0)),
         }
     }
 }
@@ -249,5 +406,5 @@ fn is_to_be_calibrated(fit: &Fit, Task { table, errors, .. }: Task<'_>) -> bool 
     let noise_v = table.head().noise_v;
     let of_noise = errors.variance_v2 / (noise_v * noise_v);
     let is_worth_it = of_noise > CALIBRATION_WORTH * CALIBRATION_WORTH;
-    is_worth_it && of_noise * (fit.normal.cost - UNFINISHED) > limit(errors.count as f32 - freedom(fit))
+    is_worth_it && of_noise * (fit.cost - UNFINISHED) > limit(errors.count as f32 - freedom(fit))
 }

@@ -52,9 +52,14 @@ pub const OTHERS: usize = 2;
 /// Radii that quantities are stored for.
 pub const RADII: usize = 2;
 
-const HEAD: usize = 24 + 4 * NUMBERS;
-/// Where the table's length stands.
+/// Largest number of a table, apart from its head's: ohm, or what makes such.
+pub(crate) const MOST: f32 = 1e9;
+
+/// Where the table's length stands, and the numbers of its [`Head`].
 const LENGTH_AT: usize = 16;
+const NUMBERS_AT: usize = 24;
+/// Bytes of a table that tell what it is to be: [`Table::announced`].
+pub const HEAD_BYTES: usize = NUMBERS_AT + 4 * NUMBERS;
 /// Least share of a disc that is on the detector: a quarter has the middle in a corner.
 pub(crate) const LEAST_SHARE: f32 = 0.2;
 pub(crate) const QUANTITIES: usize = MAX_ELECTRODES + OTHERS;
@@ -124,6 +129,20 @@ pub struct Table<'a> {
     pub(crate) coefficients: &'a [u8],
 }
 
+/// What a table says of itself in its first bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Announced {
+    /// Bytes of the whole table.
+    pub bytes: usize,
+    /// How many electrodes it has.
+    pub electrodes: usize,
+    /// The detector's and the board's numbers.
+    pub head: Head,
+    layout: u32,
+    sides: [usize; 2],
+    knots: usize,
+}
+
 /// Numbers as they are stored.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Floats<'a>(pub &'a [[u8; 4]]);
@@ -139,8 +158,9 @@ impl Floats<'_> {
         self.at(high * (high + 1) / 2 + low)
     }
 
-    fn are_finite(self) -> bool {
-        (0..self.0.len()).all(|index| self.at(index).is_finite())
+    fn are_within(self, most: f32) -> bool {
+        // As numbers without their signs these have the order of their bits; what is none has more. A board without floating point looks at each frame.
+        self.0.iter().all(|bytes| u32::from_le_bytes(*bytes) & !(1 << 31) <= most.to_bits())
     }
 }
 
@@ -165,7 +185,7 @@ pub const fn bytes_of(electrodes: usize, sides: [usize; 2], knots: usize) -> usi
     let quantities = RADII * (electrodes + OTHERS);
     let floats = pairs + 2 * electrodes + knots + 2 * quantities;
     let cells = (sides[0] - 3) * (sides[1] - 3);
-    HEAD + 4 * floats + cells.div_ceil(8) + 2 * sides[0] * sides[1] * quantities + 4
+    HEAD_BYTES + 4 * floats + cells.div_ceil(8) + 2 * sides[0] * sides[1] * quantities + 4
 }
 
 impl<'a> Table<'a> {
@@ -182,21 +202,14 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// How many bytes the table that begins so says that it has; `None` if these are the first bytes of none, or too few to tell.
-    pub fn announced_bytes(first: &[u8]) -> Option<usize> {
-        let is_table = first.first_chunk() == Some(&MAGIC);
-        let length = first.get(LENGTH_AT..LENGTH_AT + 4)?.first_chunk().map(|four| u32::from_le_bytes(*four))?;
-        is_table.then_some(length as usize)
-    }
-
-    /// Reads a table that was read before, without its checksum, which takes as long as some frames.
+    /// What the table that begins so is to be, checked as far as its [head](HEAD_BYTES) tells: before the rest of it has come.
     ///
     /// # Errors
-    /// As for [`read`](Self::read), but for the checksum.
-    pub fn read_again(bytes: &'a [u8]) -> Result<Self, TableError> {
-        let u16_at = |at: usize| bytes.get(at..at + 2).map_or(0, |two| u16::from_le_bytes([two[0], two[1]]));
-        let u32_at = |at: usize| Floats(bytes.as_chunks().0).at(at / 4).to_bits();
-        if bytes.first_chunk() != Some(&MAGIC) {
+    /// [`TableError`] if these are the first bytes of no table of this version, or not [so many](HEAD_BYTES).
+    pub fn announced(first: &[u8]) -> Result<Announced, TableError> {
+        let u16_at = |at: usize| first.get(at..at + 2).map_or(0, |two| u16::from_le_bytes([two[0], two[1]]));
+        let u32_at = |at: usize| Floats(first.as_chunks().0).at(at / 4).to_bits();
+        if first.first_chunk() != Some(&MAGIC) {
             return Err(TableError::Magic);
         }
         if u16_at(4) != VERSION {
@@ -210,18 +223,31 @@ impl<'a> Table<'a> {
         let sides =
             [counted("coefficients along x", 8, 4, MAX_SIDE)?, counted("coefficients along y", 10, 4, MAX_SIDE)?];
         let knots = counted("coefficients over distances", 12, 4, MAX_KNOTS)?;
-        let expected = bytes_of(electrodes, sides, knots);
-        let found = bytes.len();
-        if found != expected || u32_at(LENGTH_AT) as usize != expected {
+        let (expected, found) = (bytes_of(electrodes, sides, knots), u32_at(LENGTH_AT) as usize);
+        if found != expected {
             return Err(TableError::Length { found, expected });
         }
+        let cut = TableError::Length { found: first.len(), expected: HEAD_BYTES };
+        let numbers = first.get(NUMBERS_AT..HEAD_BYTES).ok_or(cut)?;
+        let head = Head::read(Floats(numbers.as_chunks().0))?;
+        Ok(Announced { bytes: expected, electrodes, head, layout: u32_at(20), sides, knots })
+    }
+
+    /// Reads a table that was read before, without its checksum, which takes as long as some frames.
+    ///
+    /// # Errors
+    /// As for [`read`](Self::read), but for the checksum.
+    pub fn read_again(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let Announced { bytes: expected, electrodes, head, layout, sides, knots } = Self::announced(bytes)?;
         let cut = || TableError::Length { found: bytes.len(), expected };
+        if bytes.len() != expected {
+            return Err(cut());
+        }
         let mut parts = Parts(bytes);
-        parts.bytes(24).ok_or_else(cut)?;
-        let head = Head::read(parts.floats(NUMBERS).ok_or_else(cut)?)?;
+        parts.bytes(HEAD_BYTES).ok_or_else(cut)?;
         let table = Self {
             head,
-            layout: u32_at(20),
+            layout,
             electrodes,
             sides,
             pads: parts.floats(electrodes * (electrodes + 1) / 2).ok_or_else(cut)?,
@@ -235,7 +261,7 @@ impl<'a> Table<'a> {
         table.check()
     }
 
-    /// Checks that all numbers are numbers.
+    /// Checks that all numbers are numbers of a detector.
     fn check(self) -> Result<Self, TableError> {
         let all = [
             ("fields between electrodes", self.pads),
@@ -244,8 +270,8 @@ impl<'a> Table<'a> {
             ("fields of walls", self.walls),
             ("steps of codes", self.codes),
         ];
-        let gains_are_sound = (0..self.electrodes).all(|e| self.channels.at(2 * e) > 0.0);
-        match all.into_iter().find(|(_, floats)| !floats.are_finite()) {
+        let gains_are_sound = (0..self.electrodes).all(|e| (1e-3..=1e3).contains(&self.channels.at(2 * e)));
+        match all.into_iter().find(|(_, floats)| !floats.are_within(MOST)) {
             Some((what, _)) => Err(TableError::Number { what }),
             None if !gains_are_sound => Err(TableError::Number { what: "gains" }),
             None => Ok(self),

@@ -11,12 +11,12 @@ use crate::samples::{seal, table};
 use crate::table::MAX_ELECTRODES;
 use crate::{Flags, Frame, FrameError, Says, Solver, Table, TableError};
 
-fn spot(x_m: f32, y_m: f32, sheets: f32) -> Spot {
+pub(crate) fn spot(x_m: f32, y_m: f32, sheets: f32) -> Spot {
     Spot { at_m: [x_m, y_m], ln_ohm: (1.0 / (sheets * 1.1e-3) + 600.0).ln(), ln_radius: 0.0 }
 }
 
 /// Readings of contacts (V).
-fn volts(table: &Table<'_>, spots: &[Spot]) -> Vec<f32> {
+pub(crate) fn volts(table: &Table<'_>, spots: &[Spot]) -> Vec<f32> {
     let (n, mut circuit) = (table.electrodes(), Circuit::EMPTY);
     assert!(circuit.solve(table, spots));
     let mut row = [0.0; MAX_ELECTRODES];
@@ -28,7 +28,7 @@ fn volts(table: &Table<'_>, spots: &[Spot]) -> Vec<f32> {
 }
 
 /// Noise of a deviation of 1 mV or so, always the same.
-fn noisy(volts: &[f32], seed: u32) -> Vec<f32> {
+pub(crate) fn noisy(volts: &[f32], seed: u32) -> Vec<f32> {
     let mut state = seed;
     let mut uniform = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -87,7 +87,7 @@ fn slopes_are_the_differences_of_the_sum_of_squares() {
         };
         let slope = -0.5 * (moved(0.02) - moved(-0.02)) / 0.04;
         let off = (slope - normal.pull[parameter]).abs() / normal.matrix[parameter][parameter].sqrt();
-        assert!(off < 0.01 * normal.cost.sqrt(), "parameter {parameter}: {slope} {}", normal.pull[parameter]);
+        assert!(off < 0.02 * normal.cost.sqrt(), "parameter {parameter}: {slope} {}", normal.pull[parameter]);
     }
 }
 
@@ -231,26 +231,45 @@ fn damaged_tables_are_refused_and_say_why() {
 }
 
 proptest! {
-    /// Whatever a table says, under a right checksum: it is refused, or frames have answers.
+    /// Whatever a table says, under a right checksum: it is refused, or frames have answers that are numbers.
     #[test]
-    fn no_table_ends_the_program(
-        numbers in prop::collection::vec((0usize..3000, any::<u8>()), 0..12),
+    fn a_table_is_refused_or_its_answers_are_finite(
+        // Of the head; by factors, and anything.
+        factors in prop::collection::vec((0usize..24, -8.0f32..8.0), 0..4),
+        numbers in prop::collection::vec((0usize..750, any::<u32>()), 0..2),
         others in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..200),
-        volts in prop::collection::vec(-3.0f32..3.0, 256),
+        is_random in any::<bool>(),
+        random_v in prop::collection::vec(-3.0f32..3.0, 256),
     ) {
         let mut bytes = table();
+        let pressed_v = volts(&Table::read(&bytes).unwrap(), &[spot(0.004, -0.011, 0.3), spot(-0.015, 0.008, 3.0)]);
         bytes.truncate(bytes.len() - 4);
-        let others = others.into_iter().map(|(index, byte)| (index.index(bytes.len()), byte));
-        for (at, byte) in numbers.into_iter().chain(others.collect::<Vec<_>>()) {
-            bytes[at] = byte;
+        // Behind the numbers.
+        others.iter().for_each(|(index, byte)| { let at = 3000 + index.index(bytes.len() - 3000); bytes[at] = *byte; });
+        let at = |index: usize| 24 + 4 * index..28 + 4 * index;
+        for (index, ln) in factors {
+            let old = f32::from_le_bytes(bytes[at(index)].try_into().unwrap());
+            bytes[at(index)].copy_from_slice(&(old * 10f32.powf(ln)).to_le_bytes());
+        }
+        for (index, bits) in numbers {
+            bytes[at(index)].copy_from_slice(&bits.to_le_bytes());
         }
         seal(&mut bytes);
         if let Ok(table) = Table::read(&bytes) {
             let mut solver = Solver::new();
+            let [low_m, high_m] = table.bounds_m();
             for _ in 0..2 {
-                let frame = Frame::of_volts(&volts[..table.electrodes().pow(2).min(256)]);
-                if let Ok(answer) = solver.solve(&table, &frame) {
-                    prop_assert!(answer.contacts().len() <= crate::MAX_CONTACTS);
+                let answer = solver.solve(&table, &Frame::of_volts(if is_random { &random_v } else { &pressed_v })).unwrap();
+                prop_assert!(answer.residual.is_finite());
+                for found in answer.contacts() {
+                    let numbers = [
+                        found.x_m, found.y_m, found.conductance_s, found.conductance_sigma_s, found.apparent_conductance_s,
+                        found.force_n.unwrap_or(0.0), found.radius_m, found.radius_sigma_m, found.sigma_m[0], found.sigma_m[1],
+                        found.correlation,
+                    ];
+                    prop_assert!(numbers.iter().all(|number| number.is_finite()), "{found:?} {:?}", table.head());
+                    prop_assert!(found.x_m >= low_m[0] && found.x_m <= high_m[0], "{found:?}");
+                    prop_assert!(found.y_m >= low_m[1] && found.y_m <= high_m[1], "{found:?}");
                 }
             }
         }

@@ -30,13 +30,8 @@ impl<const READINGS: usize> Cells<READINGS> {
         self.says.fill(Says::Nothing);
     }
 
-    /// Takes a frame; returns what touches.
-    pub fn touch(
-        &mut self,
-        table: &Table<'_>,
-        input: &Input,
-        (scanned, scope, readings): (&Scanned, &Scope, &[u16]),
-    ) -> Option<Frame<'_>> {
+    /// Takes a frame.
+    pub fn take(&mut self, table: &Table<'_>, input: &Input, (scanned, scope, readings): (&Scanned, &Scope, &[u16])) {
         let (n, noise_v) = (table.electrodes(), table.head().noise_v);
         let ground_v = (input.drive_v - table.head().drive_v).max(0.0);
         for ((g, e), reading) in scope.cells().zip(readings) {
@@ -57,8 +52,18 @@ impl<const READINGS: usize> Cells<READINGS> {
         if self.rest.was_touched(&self.touch_v, noise_v, n) {
             self.rest.restart();
         }
-        let (volts, says) = (self.touch_v.get(..n * n)?, self.says.get(..n * n)?);
-        Some(Frame::new(volts, says))
+    }
+
+    /// What touches.
+    pub fn touch(&self, table: &Table<'_>) -> Option<Frame<'_>> {
+        let readings = table.electrodes() * table.electrodes();
+        Some(Frame::new(self.touch_v.get(..readings)?, self.says.get(..readings)?))
+    }
+
+    /// What touches of one cell (V).
+    #[cfg(test)]
+    pub fn touch_v(&self, cell: usize) -> f32 {
+        self.touch_v.get(cell).copied().unwrap_or(f32::NAN)
     }
 
     /// Whether readings at rest are known.

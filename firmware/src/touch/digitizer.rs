@@ -27,15 +27,12 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Digitizer<S, H, READIN
         Self { finder, sink, fingers: Fingers::NONE, bounds_m: None, output: Output::Frames }
     }
 
-    /// Finds contacts if there is a table, and none of one that there is no more.
+    /// Finds contacts by the table that there is, if there is one.
     fn begin(&mut self) {
-        if !self.finder.set_output(Output::Contacts) {
-            (self.bounds_m, self.output) = (None, Output::Frames);
-        } else if self.bounds_m.is_none() {
-            self.bounds_m = self.finder.bounds_m();
-            if let Some([low_m, high_m]) = self.bounds_m {
-                self.sink.set_size([0, 1].map(|axis: usize| high_m[axis] - low_m[axis]));
-            }
+        self.output = Output::Frames;
+        self.bounds_m = if self.finder.set_output(Output::Contacts) { self.finder.bounds_m() } else { None };
+        if let Some([low_m, high_m]) = self.bounds_m {
+            self.sink.set_size([0, 1].map(|axis: usize| high_m[axis] - low_m[axis]));
         }
     }
 
@@ -78,8 +75,12 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Touch for Digitizer<S,
     }
 
     fn take(&mut self, piece: &TablePiece) -> bool {
+        let before = self.finder.used();
         let fits = self.finder.take(piece);
-        self.begin();
+        // Else what touches goes on touching, and rest stays known.
+        if self.finder.used() != before {
+            self.begin();
+        }
         fits
     }
 
@@ -110,5 +111,9 @@ impl<S: TableStore, H: ReportSink, const READINGS: usize> Touch for Digitizer<S,
         let found = self.finder.contacts(scanned, scope, readings, attend);
         self.report(found.as_ref(), scanned.time_us);
         found.filter(|_| self.output.has_contacts())
+    }
+
+    fn go_on(&mut self, attend: &mut dyn FnMut()) {
+        self.finder.go_on(attend);
     }
 }

@@ -4,23 +4,22 @@ use tactomo_protocol::scope::Scope;
 use tactomo_protocol::{
     ContactCode, ContactFlags, Contacts, FrameHead, Hello, Output, TableId, TablePiece, TableState,
 };
-use tactomo_touch_core::{Answer, Contact, Flags, Solver, Table};
+use tactomo_touch_core::{Answer, Contact, Flags, Solver};
 
 use super::cells::Cells;
 use super::input::Input;
+use super::tables::Tables;
 use super::{TableStore, Touch};
 use crate::scan::Scanned;
 
-/// A table's drive may be above the board's by so much (V), as rounding to millivolts makes it; what it is below is how far the ground is lifted.
-const DRIVE_ROUNDING_V: f32 = 1e-3;
+/// Pieces of the work on a frame that are done at once: contacts that are followed rarely take more. What is left, most of a search, is done between rows, a piece each,
+/// while commands are obeyed and the scan goes on. Frames that come meanwhile are not looked at.
+const AT_ONCE: u32 = 6;
 
 /// Finds contacts by a table that it keeps in `S`, in frames of up to `READINGS` readings.
 #[derive(Debug)]
 pub struct ContactFinder<S, const READINGS: usize> {
-    store: S,
-    /// Bytes of the table under way, or of the one in use.
-    held: usize,
-    usable: Option<TableId>,
+    tables: Tables<S, READINGS>,
     input: Input,
     output: Output,
     solver: Solver,
@@ -29,15 +28,15 @@ pub struct ContactFinder<S, const READINGS: usize> {
     broken_wires: u32,
     last_broken: u32,
     told_broken: u32,
+    /// What was told last, if anything was.
+    told: Option<Contacts>,
 }
 
 impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
     /// Uses the table that `store` has kept, if it has one of this board.
     pub const fn new(store: S) -> Self {
         Self {
-            store,
-            held: 0,
-            usable: None,
+            tables: Tables::new(store),
             input: Input::NONE,
             output: Output::Frames,
             solver: Solver::new(),
@@ -45,63 +44,42 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
             broken_wires: 0,
             last_broken: 0,
             told_broken: 0,
+            told: None,
         }
     }
 
     /// Lowest and highest corner of the detector (m), if there is a table of it.
     pub fn bounds_m(&self) -> Option<[[f32; 2]; 2]> {
-        self.usable?;
-        let table = Table::read_again(self.store.bytes().get(..self.held)?).ok()?;
-        Some(table.bounds_m())
+        self.tables.table().map(|table| table.bounds_m())
     }
 
-    /// The table in the store's first bytes, if it is sound and one of this board.
-    fn sound(&self, length: usize) -> Option<TableId> {
-        let bytes = self.store.bytes().get(..length)?;
-        let table = Table::read(bytes).ok()?;
-        let fits = table.electrodes() == usize::from(self.input.electrodes)
-            && table.electrodes() * table.electrodes() <= READINGS
-            && table.head().drive_v <= self.input.drive_v + DRIVE_ROUNDING_V;
-        let checksum = u32::from_le_bytes(*bytes.last_chunk()?);
-        fits.then_some(TableId { layout: table.layout(), checksum })
+    /// Which table contacts are found by.
+    pub(super) fn used(&self) -> Option<TableId> {
+        self.tables.used()
     }
 
-    /// Begins a new table, or goes on with the one under way; returns whether it can become one.
-    fn write(&mut self, at: usize, bytes: &[u8]) -> bool {
-        if at == 0 {
-            (self.held, self.usable, self.output) = (0, None, Output::Frames);
+    /// Does so many pieces of the work on a frame; `None` if there is nothing to work on.
+    fn work(&mut self, pieces: u32, attend: &mut dyn FnMut()) -> Option<()> {
+        let Self { tables, solver, cells, .. } = self;
+        let table = tables.table()?;
+        let Some(answer) = solver.solve_in_pieces(&table, &cells.touch(&table)?, pieces, attend).ok()? else {
+            return Some(());
+        };
+        self.broken_wires = answer.left_out & self.last_broken;
+        self.last_broken = answer.left_out;
+        if cells.learn(&answer, &table) {
+            // What follows is above rest.
+            solver.reset();
         }
-        // A piece that came twice, or after one that was lost: the state says where to go on.
-        if at != self.held || self.usable.is_some() {
-            return true;
-        }
-        let Some(held) = self.store.write(at, bytes) else { return false };
-        self.held = held;
-        match self.store.bytes().get(..held).and_then(Table::announced_bytes) {
-            Some(length) if length > self.store.bytes().len() || length < held => self.refuse(),
-            Some(length) if length == held => self.finish(length),
-            _ => true,
-        }
-    }
-
-    fn finish(&mut self, length: usize) -> bool {
-        let Some(table) = self.sound(length) else { return self.refuse() };
-        self.usable = Some(table);
-        self.store.keep(length)
-    }
-
-    fn refuse(&mut self) -> bool {
-        self.held = 0;
-        false
+        self.told = Some(told(&answer));
+        Some(())
     }
 }
 
 impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> {
     fn meet(&mut self, hello: &Hello) {
         self.input = Input::of(hello);
-        let length = Table::announced_bytes(self.store.bytes());
-        self.usable = length.and_then(|length| self.sound(length));
-        self.held = length.filter(|_| self.usable.is_some()).unwrap_or(0);
+        self.tables.look(&self.input);
     }
 
     fn output(&self) -> Output {
@@ -109,7 +87,7 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
     }
 
     fn set_output(&mut self, output: Output) -> bool {
-        let can = self.usable.is_some() || !output.has_contacts();
+        let can = self.used().is_some() || !output.has_contacts();
         if can {
             self.output = output;
             self.restart();
@@ -118,18 +96,25 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
     }
 
     fn take(&mut self, piece: &TablePiece) -> bool {
-        piece.bytes.is_empty() || self.write(piece.at as usize, &piece.bytes)
+        let before = self.used();
+        let fits = self.tables.take(piece, &self.input);
+        if self.used() != before {
+            // Contacts of the new one are asked for anew.
+            self.output = Output::Frames;
+            self.restart();
+        }
+        fits
     }
 
     fn table(&self) -> TableState {
-        let [room, held] = [self.store.bytes().len(), self.held].map(|bytes| bytes as u32);
-        TableState { answers: 0, room, held, usable: self.usable }
+        self.tables.state()
     }
 
     fn restart(&mut self) {
         self.solver.reset();
         self.cells.restart();
         self.told_broken = 0;
+        self.told = None;
     }
 
     fn take_broken_wires(&mut self) -> u32 {
@@ -145,25 +130,29 @@ impl<S: TableStore, const READINGS: usize> Touch for ContactFinder<S, READINGS> 
         readings: &[u16],
         attend: &mut dyn FnMut(),
     ) -> Option<Contacts> {
-        let Self { store, held, input, output, solver, cells, .. } = self;
-        if !output.has_contacts() {
+        if !self.output.has_contacts() {
             return None;
         }
-        // It was read, and checked, when it came.
-        let table = Table::read_again(store.bytes().get(..*held)?).ok()?;
-        let frame = cells.touch(&table, input, (scanned, scope, readings))?;
-        let answer = solver.solve_while(&table, &frame, attend).ok()?;
-        self.broken_wires = answer.left_out & self.last_broken;
-        self.last_broken = answer.left_out;
-        if cells.learn(&answer, &table) {
-            // What follows is above rest.
-            solver.reset();
+        if !self.solver.is_busy() {
+            let Self { tables, input, cells, .. } = self;
+            cells.take(&tables.table()?, input, (scanned, scope, readings));
+            self.work(AT_ONCE, attend)?;
         }
-        let mut contacts = told(&answer);
-        if !cells.knows_rest() {
+        let nothing = || told(&Answer::default());
+        let mut contacts = self.told.clone().unwrap_or_else(nothing);
+        if self.solver.is_busy() {
+            contacts.flags.raise(ContactFlags::MISFIT);
+        }
+        if !self.cells.knows_rest() {
             contacts.flags.raise(ContactFlags::RESTING);
         }
         Some(contacts)
+    }
+
+    fn go_on(&mut self, attend: &mut dyn FnMut()) {
+        if self.output.has_contacts() && self.solver.is_busy() {
+            let _ = self.work(1, attend);
+        }
     }
 }
 

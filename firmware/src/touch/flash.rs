@@ -1,38 +1,31 @@
-//! A table in flash.
+//! Tables in flash.
 
-use embedded_storage::nor_flash::NorFlash;
+use embedded_storage::nor_flash::MultiwriteNorFlash;
 
 use super::TableStore;
+use super::store::CHUNK;
 
-/// Bytes that are written, and read back, at once: as many as a piece of a table has.
-const CHUNK: usize = 64;
-
-/// Where the bytes of a region of flash are read: flash that is part of the address space, where they lie; other flash from a [`RamCopy`].
+/// Where the bytes of a place in flash are read: flash that is part of the address space, where they lie; other flash from a [`RamCopy`].
 pub trait View<F> {
-    /// The bytes of the region.
+    /// The bytes of the place that is seen: always as many.
     fn bytes<'a>(&'a self, flash: &'a F) -> &'a [u8];
 
-    /// Makes the region, from `base` on, be seen as it is; returns whether it could. Comes once, before all else.
-    fn open(&mut self, _flash: &mut F, _base: u32) -> bool {
-        true
-    }
-
-    /// These bytes come next to those that are seen. The last may not be in flash yet, if flash is written in words of several bytes.
-    fn put(&mut self, _at: usize, _bytes: &[u8]) {}
+    /// Makes the place that begins at `base` be seen as it is; returns whether it could.
+    fn open(&mut self, flash: &mut F, base: u32) -> bool;
 }
 
-/// A copy in memory of a region of flash, which it is read into when the board starts.
+/// A copy in memory of a place in flash.
 #[derive(Debug)]
 pub struct RamCopy<B>(B);
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>> RamCopy<B> {
-    /// In this memory, as long as the region.
+    /// In this memory, as long as the place.
     pub fn new(memory: B) -> Self {
         Self(memory)
     }
 }
 
-impl<F: NorFlash, B: AsRef<[u8]> + AsMut<[u8]>> View<F> for RamCopy<B> {
+impl<F: MultiwriteNorFlash, B: AsRef<[u8]> + AsMut<[u8]>> View<F> for RamCopy<B> {
     fn bytes<'a>(&'a self, _flash: &'a F) -> &'a [u8] {
         self.0.as_ref()
     }
@@ -40,125 +33,97 @@ impl<F: NorFlash, B: AsRef<[u8]> + AsMut<[u8]>> View<F> for RamCopy<B> {
     fn open(&mut self, flash: &mut F, base: u32) -> bool {
         flash.read(base, self.0.as_mut()).is_ok()
     }
-
-    fn put(&mut self, at: usize, bytes: &[u8]) {
-        if let Some(place) = self.0.as_mut().get_mut(at..).and_then(|rest| rest.get_mut(..bytes.len())) {
-            place.copy_from_slice(bytes);
-        }
-    }
 }
 
-/// A table in a region of NOR flash, which a reset leaves alone.
+/// Tables in two places of NOR flash, which a reset leaves alone.
 ///
-/// Sectors are erased when the first of their bytes comes, so that no call takes longer than one sector. Bytes that are there already are not written
-/// again: the same table a second time wears nothing. A table that was cut off is not sound after a reset, by its own checksum at its end.
+/// Sectors are erased when the first of their bytes comes, so that no call takes longer than one sector. A place whose table was replaced, or whose writing
+/// was cut off, has none: the one by its first word, which is zeros, the other by the checksum at its end.
 #[derive(Debug)]
 pub struct FlashStore<F, V> {
     flash: F,
     view: V,
-    /// Where the region begins, and its length; none if it does not fit this flash.
-    base: u32,
+    /// Where the place that is seen begins, and the other.
+    seen: u32,
+    other: u32,
+    /// Length of each; none if they do not fit this flash.
     room: usize,
-    /// Bytes, from the first on, that are in flash as they are seen, but for the beginning of a word.
-    written: usize,
-    /// What follows them is erased, up to here.
+    /// The other is erased up to here.
     blank: usize,
 }
 
-impl<F: NorFlash, V: View<F>> FlashStore<F, V> {
-    /// In the region of `flash` that begins at `base` and is as long as what `view` shows. Keeps nothing if these are no sectors of this flash.
-    pub fn new(mut flash: F, mut view: V, base: u32) -> Self {
+impl<F: MultiwriteNorFlash, V: View<F>> FlashStore<F, V> {
+    /// In the places of `flash` that begin at `bases` and are as long as what `view` shows. Keeps nothing if these are no sectors of this flash, or the same.
+    pub fn new(mut flash: F, mut view: V, bases: [u32; 2]) -> Self {
         const {
             assert!(CHUNK.is_multiple_of(F::WRITE_SIZE) && F::WRITE_SIZE.is_multiple_of(F::READ_SIZE));
             assert!(F::ERASE_SIZE.is_multiple_of(CHUNK));
         }
-        let (begin, length) = (base as usize, view.bytes(&flash).len());
-        let is_sectors = begin.is_multiple_of(F::ERASE_SIZE) && length.is_multiple_of(F::ERASE_SIZE);
-        let fits = begin.checked_add(length).is_some_and(|end| end <= flash.capacity());
-        let room = if is_sectors && fits { length } else { 0 };
-        // What could not be read is taken for nothing.
-        let written = if room > 0 && view.open(&mut flash, base) { room } else { 0 };
-        Self { flash, view, base, room, written, blank: written }
+        let length = view.bytes(&flash).len();
+        let is_place = |begin: u32| {
+            let end = (begin as usize).checked_add(length);
+            (begin as usize).is_multiple_of(F::ERASE_SIZE) && end.is_some_and(|end| end <= flash.capacity())
+        };
+        let [seen, other] = bases;
+        let are_apart = seen.abs_diff(other) as usize >= length;
+        let fits = length.is_multiple_of(F::ERASE_SIZE) && are_apart && bases.into_iter().all(is_place);
+        // What cannot be read is no place for a table.
+        let room = if fits && view.open(&mut flash, seen) { length } else { 0 };
+        Self { flash, view, seen, other, room, blank: 0 }
     }
 
-    /// Whether these bytes are there.
-    fn has(&self, at: usize, bytes: &[u8]) -> bool {
-        at + bytes.len() <= self.written && self.bytes().get(at..at + bytes.len()) == Some(bytes)
-    }
-
-    /// Nothing of what is there counts: its sectors will be erased.
-    fn forget(&mut self) {
-        (self.written, self.blank) = (0, 0);
-    }
-
-    /// Appends bytes to what is written, as far as they fill words; what is left waits for those that follow.
-    fn append(&mut self, bytes: &[u8]) -> Result<(), Failed> {
-        let (start, end) = (self.written, self.written + bytes.len());
-        while self.blank < end {
-            let sector = self.base + self.blank as u32;
-            self.flash.erase(sector, sector + F::ERASE_SIZE as u32).map_err(|_| Failed)?;
-            self.blank += F::ERASE_SIZE;
-        }
-        let (mut from, to) = (start - start % F::WRITE_SIZE, end - end % F::WRITE_SIZE);
-        while from < to {
-            let mut words = Words([0xFF; CHUNK]);
-            let words = &mut words.0[..CHUNK.min(to - from)];
-            // The beginning of the first word came before.
-            let began = start.saturating_sub(from).min(words.len());
-            words[..began].copy_from_slice(self.bytes().get(from..from + began).ok_or(Failed)?);
-            let new = bytes.get((from + began).saturating_sub(start)..).unwrap_or_default();
-            words[began..].iter_mut().zip(new).for_each(|(place, byte)| *place = *byte);
-            self.program(from, words)?;
-            from += words.len();
-        }
-        self.view.put(start, bytes);
-        self.written = end;
-        Ok(())
-    }
-
-    /// Writes whole words to erased flash, and looks whether they are there.
-    fn program(&mut self, at: usize, words: &[u8]) -> Result<(), Failed> {
-        let place = self.base + at as u32;
-        self.flash.write(place, words).map_err(|_| Failed)?;
-        let mut found = Words([0; CHUNK]);
+    /// Writes whole words to erased flash, or zeros to any; returns whether they are there.
+    fn program(&mut self, place: u32, words: &[u8]) -> bool {
+        let mut found = Words([0xFF; CHUNK]);
         let found = &mut found.0[..words.len()];
-        self.flash.read(place, found).map_err(|_| Failed)?;
-        if found == words { Ok(()) } else { Err(Failed) }
+        self.flash.write(place, words).is_ok() && self.flash.read(place, found).is_ok() && found == words
     }
 }
 
-impl<F: NorFlash, V: View<F>> TableStore for FlashStore<F, V> {
+impl<F: MultiwriteNorFlash, V: View<F>> TableStore for FlashStore<F, V> {
     fn bytes(&self) -> &[u8] {
         self.view.bytes(&self.flash).get(..self.room).unwrap_or_default()
     }
 
-    fn write(&mut self, at: usize, bytes: &[u8]) -> Option<usize> {
-        let end = at.checked_add(bytes.len()).filter(|end| *end <= self.room)?;
-        if self.has(at, bytes) {
-            return Some(end);
+    fn write(&mut self, at: usize, bytes: &[u8]) -> bool {
+        if at.checked_add(bytes.len()).is_none_or(|end| end > self.room) {
+            return false;
         }
-        if at < self.written {
-            self.forget();
+        if at == 0 {
+            self.blank = 0;
         }
-        if at == self.written && self.append(bytes).is_err() {
-            self.forget();
-            return None;
+        for (number, bytes) in bytes.chunks(CHUNK).enumerate() {
+            let at = at + number * CHUNK;
+            if self.blank <= at {
+                let sector = self.other + self.blank as u32;
+                if self.flash.erase(sector, sector + F::ERASE_SIZE as u32).is_err() {
+                    return false;
+                }
+                self.blank += F::ERASE_SIZE;
+            }
+            // The last word is filled up.
+            let mut words = Words([0xFF; CHUNK]);
+            words.0[..bytes.len()].copy_from_slice(bytes);
+            if !self.program(self.other + at as u32, &words.0[..bytes.len().next_multiple_of(F::WRITE_SIZE)]) {
+                return false;
+            }
         }
-        Some(self.written)
+        true
     }
 
-    fn keep(&mut self, length: usize) -> bool {
-        let padding = self.written.next_multiple_of(F::WRITE_SIZE) - self.written;
-        let is_kept = length <= self.written && self.append(&[0xFF; CHUNK][..padding]).is_ok();
-        if !is_kept {
-            self.forget();
-        }
-        is_kept
+    fn swap(&mut self) -> bool {
+        (self.seen, self.other) = (self.other, self.seen);
+        self.blank = 0;
+        self.room > 0 && self.view.open(&mut self.flash, self.seen)
+    }
+
+    fn keep(&mut self) -> bool {
+        let (mut found, zeros) = (Words([0xFF; CHUNK]), Words([0; CHUNK]));
+        let (found, zeros) = (&mut found.0[..F::WRITE_SIZE], &zeros.0[..F::WRITE_SIZE]);
+        // One that is zeros already is not worn.
+        (self.flash.read(self.other, found).is_ok() && found == zeros) || self.program(self.other, zeros)
     }
 }
-
-/// Flash did not do as it was told.
-struct Failed;
 
 /// Some drivers want words at addresses of words.
 #[repr(align(8))]

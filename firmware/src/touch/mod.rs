@@ -7,6 +7,9 @@ mod flash;
 mod input;
 mod rest;
 mod store;
+mod tables;
+#[cfg(test)]
+mod tests;
 
 use tactomo_protocol::{Contacts, Hello, Output, Scope, TablePiece, TableState};
 
@@ -27,7 +30,7 @@ pub trait Touch {
     /// Streams this from now on; returns whether it can. If not, it stays as it was. Contacts begin [anew](Self::restart) then, but for those that go elsewhere too.
     fn set_output(&mut self, output: Output) -> bool;
 
-    /// Takes a piece of a table; returns whether it can be part of one that fits the board.
+    /// Takes a piece of a table; returns whether it can be part of one that fits the board. The table before is used until the new one is whole.
     fn take(&mut self, piece: &TablePiece) -> bool;
 
     /// What there is of a table.
@@ -46,7 +49,8 @@ pub trait Touch {
         0
     }
 
-    /// The contacts of a frame, if they are to be streamed. Whoever has something else to do is called by `attend` meanwhile.
+    /// The contacts of a frame, if they are to be streamed: while one before is still worked on, those that were told last. Whoever has something else to do is
+    /// called by `attend` meanwhile.
     fn contacts(
         &mut self,
         scanned: &Scanned,
@@ -54,6 +58,9 @@ pub trait Touch {
         readings: &[u16],
         attend: &mut dyn FnMut(),
     ) -> Option<Contacts>;
+
+    /// Does a piece of the work on a frame that is still worked on, if there is one: comes between two rows, and between commands.
+    fn go_on(&mut self, _attend: &mut dyn FnMut()) {}
 }
 
 /// A board that streams frames and nothing else: takes no memory.

@@ -79,3 +79,93 @@ impl<const READINGS: usize> Rest<READINGS> {
         self.is_known && touch_v.iter().filter(|volts| **volts < -MOVED * noise_v).count() >= electrodes
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const NOISE_V: f32 = 1e-3;
+
+    /// Two cells that have had so many readings of 1 V and 2 V; a third is never read.
+    fn after(count: usize) -> Rest<3> {
+        let mut rest = Rest::NONE;
+        for _ in 0..count {
+            rest.add(0, 1.0, NOISE_V);
+            rest.add(1, 2.0, NOISE_V);
+        }
+        rest
+    }
+
+    #[test]
+    fn rest_is_known_after_64_readings_of_each_cell_that_is_read() {
+        for count in 0..200 {
+            let mut rest = after(count);
+            assert_eq!((rest.has_stood_still(), rest.is_known()), (count >= 64, false), "{count}");
+            assert_eq!([0, 1, 2].map(|cell| rest.above(cell, 5.0)), [5.0; 3], "a perfect detector's is zero");
+            rest.take();
+            if count > 0 {
+                assert_eq!([0, 1, 2, 3].map(|cell| rest.above(cell, 5.0)), [4.0, 3.0, 5.0, 5.0], "{count}");
+            }
+        }
+        let mut rest = after(64);
+        rest.add(2, 3.0, NOISE_V);
+        assert!(!rest.has_stood_still(), "one of the cells had one reading");
+        rest.add(7, 3.0, NOISE_V);
+        rest.restart();
+        assert!(!rest.has_stood_still() && !rest.is_known());
+    }
+
+    /// Of eight deviations, from the fifth reading on.
+    #[test]
+    fn a_reading_that_has_moved_begins_rest_anew() {
+        for (count, moved_v, begins) in
+            [(3, 1.0, false), (4, 7.9e-3, false), (4, 8.1e-3, true), (63, -8.1e-3, true), (100, -7.9e-3, false)]
+        {
+            let mut rest = after(count);
+            rest.add(0, 1.0 + moved_v, NOISE_V);
+            for _ in 0..64 {
+                rest.add(1, 2.0, NOISE_V);
+            }
+            // Cell 0 is as good as unread after it began anew.
+            assert_eq!(rest.has_stood_still(), begins || count >= 63, "{count} readings, then {moved_v} V");
+        }
+    }
+
+    #[test]
+    fn rest_was_none_where_as_many_readings_as_electrodes_are_far_below_it() {
+        for electrodes in 1..=3 {
+            for below in 0..=3 {
+                let touch_v: [f32; 3] = core::array::from_fn(|cell| if cell < below { -8.1e-3 } else { -7.9e-3 });
+                let mut rest = after(64);
+                assert!(!rest.was_touched(&touch_v, NOISE_V, electrodes), "it is not known");
+                rest.take();
+                assert_eq!(rest.was_touched(&touch_v, NOISE_V, electrodes), below >= electrodes);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn rest_is_the_mean_of_readings_and_follows_voltages_alone(
+            noise in prop::collection::vec(-1.0..1.0f32, 64),
+            left_v in -0.1..0.1f32,
+        ) {
+            let mut rest = Rest::<2>::NONE;
+            noise.iter().for_each(|noise| rest.add(0, 1.0 + NOISE_V * noise, NOISE_V));
+            noise.iter().for_each(|noise| rest.add(1, 1.0 + NOISE_V * noise, NOISE_V));
+            prop_assert!(rest.has_stood_still());
+            rest.add(0, 1.0 + 5.0 * NOISE_V, NOISE_V);
+            rest.take();
+            let mean_v = 1.0 + NOISE_V * noise.iter().sum::<f32>() / 64.0;
+            prop_assert!((rest.above(0, 2.0) - (2.0 - mean_v)).abs() < 1e-5, "the mean of the first 64");
+            let before_v = [0, 1].map(|cell| rest.above(cell, 0.0));
+            for says in [Says::Nothing, Says::AtMost, Says::AtLeast] {
+                rest.follow(&[left_v; 2], &[Says::Voltage, says]);
+            }
+            let moved_v = [0, 1].map(|cell| before_v[cell] - rest.above(cell, 0.0));
+            prop_assert!((moved_v[0] - 3.0 * left_v / 4096.0).abs() < 1e-6 && moved_v[1] == 0.0, "{:?}", moved_v);
+        }
+    }
+}

@@ -354,4 +354,84 @@ mod tests {
         clock.said(Clock { answers: 3, time_us: 2_000 }, Duration::from_secs(1));
         assert_eq!(clock.frame(2_500, Duration::from_secs(1)), None);
     }
+
+    fn at(seconds: f64) -> Duration {
+        Duration::from_secs_f64(seconds)
+    }
+
+    /// An exchange that takes 2 ms, with a board whose clock is behind by so much.
+    fn exchange(clock: &mut BoardClock, tag: u8, sent_s: f64, behind_s: f64) {
+        clock.asked(tag, at(sent_s));
+        clock.said(Clock { answers: tag, time_us: ((sent_s + 1e-3 - behind_s) * 1e6) as u32 }, at(sent_s + 2e-3));
+    }
+
+    /// How far a frame of that moment is from where it was, less what is told as its error (s).
+    fn beyond_s(clock: &mut BoardClock, scanned_s: f64, behind_s: f64) -> f64 {
+        let came_s = scanned_s + 4e-3;
+        let told = clock.frame(((scanned_s - behind_s) * 1e6) as u32, at(came_s)).expect("a clock that is known");
+        (came_s - told.delay_s - scanned_s).abs() - told.error_s - 2e-6
+    }
+
+    #[test]
+    fn a_command_that_was_sent_again_bounds_the_clock_from_its_first_sending() {
+        let mut clock = BoardClock::default();
+        clock.asked(5, at(1.0));
+        clock.asked(5, at(3.0));
+        // It obeyed the first, and its answer was late.
+        clock.said(Clock { answers: 5, time_us: 1_001_000 }, at(3.1));
+        assert!(beyond_s(&mut clock, 3.2, 0.0) <= 0.0);
+        // The tag is free again, for a command after it.
+        exchange(&mut clock, 5, 4.0, 0.0);
+        let told = clock.frame(4_100_000, at(4.101)).expect("a clock that is known");
+        assert!(told.error_s < 2e-3, "{told:?}");
+    }
+
+    #[test]
+    fn an_answer_bounds_the_clock_once_and_only_if_it_was_asked_for() {
+        // Asked and answered; answered twice; another's; forgotten behind sixteen others; asked before a restart.
+        let known = |talk: &dyn Fn(&mut BoardClock)| {
+            let mut clock = BoardClock::default();
+            talk(&mut clock);
+            clock.frame(2_000_000, at(3.0)).is_some()
+        };
+        let answer = |clock: &mut BoardClock, tag| clock.said(Clock { answers: tag, time_us: 1_001_000 }, at(1.1));
+        assert!(known(&|clock| {
+            clock.asked(1, at(1.0));
+            answer(clock, 1);
+        }));
+        assert!(!known(&|clock| {
+            clock.asked(1, at(1.0));
+            answer(clock, 2);
+        }));
+        for (others, is_known) in [(15, true), (16, false)] {
+            assert_eq!(
+                known(&|clock| {
+                    (1..=1 + others).for_each(|tag| clock.asked(tag, at(1.0)));
+                    answer(clock, 1);
+                }),
+                is_known
+            );
+        }
+        assert!(!known(&|clock| {
+            clock.asked(1, at(1.0));
+            clock.restart();
+            answer(clock, 1);
+        }));
+        let mut clock = BoardClock::default();
+        exchange(&mut clock, 1, 1.0, 0.0);
+        // The same answer once more, much later, is of no command: it bounds nothing from below.
+        clock.said(Clock { answers: 1, time_us: 5_000_000 }, at(9.0));
+        assert!(beyond_s(&mut clock, 9.1, 0.0) <= 0.0);
+    }
+
+    #[test]
+    fn a_time_ten_seconds_back_is_of_a_board_that_has_started_anew_and_a_slow_frame_is_not() {
+        let mut clock = BoardClock::default();
+        (0..20u8).for_each(|i| exchange(&mut clock, i + 1, 100.0 + f64::from(i), 0.0));
+        assert!(clock.frame(110_000_000, at(119.1)).is_some(), "nine seconds old");
+        assert!(beyond_s(&mut clock, 119.2, 0.0) <= 0.0);
+        assert_eq!(clock.frame(1_000_000, at(119.3)), None, "its clock is not known");
+        exchange(&mut clock, 40, 120.0, 118.0);
+        assert!(beyond_s(&mut clock, 120.5, 118.0) <= 0.0);
+    }
 }

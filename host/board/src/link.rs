@@ -16,6 +16,11 @@ pub trait Link: Send {
     /// What a person calls it, such as `/dev/ttyUSB0` or `simulated board`.
     fn name(&self) -> String;
 
+    /// The serial number of the device at the other end, if it has one that no other device of this machine has.
+    fn serial_number(&self) -> Option<String> {
+        None
+    }
+
     /// Reads what has come into `buffer`, waiting at most about 50 ms for it; 0 if nothing came.
     ///
     /// # Errors

@@ -48,6 +48,7 @@ use std::io;
 use std::path::PathBuf;
 
 use tactomo_physics::detector::TomlError;
+use tactomo_physics::new_file::NewFileError;
 
 /// What a recording begins with.
 pub const MAGIC: [u8; 8] = *b"\x89TCTO\r\n\x1a";
@@ -58,7 +59,7 @@ const VERSION: u8 = 2;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// The file cannot be opened or created.
+    /// The file cannot be opened.
     #[error("cannot open the recording {path}")]
     Open {
         /// The file.
@@ -66,6 +67,18 @@ pub enum RecordError {
         /// What the system says.
         source: io::Error,
     },
+    /// A folder, perhaps of recordings.
+    #[error(
+        "{path} is a folder, not a recording: name one of the recordings in it. `tactomo live --skin {path}` shows all of them together, \
+         `tactomo recording check {path}` tells how they are"
+    )]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A new recording cannot be made.
+    #[error(transparent)]
+    New(#[from] NewFileError),
     /// The file does not begin as a recording does.
     #[error("{path} is not a recording of tactomo, or too damaged to be read as one")]
     NotARecording {

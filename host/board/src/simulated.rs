@@ -260,7 +260,7 @@ fn firmware(
     let chip = SimulatedChip::new(circuit);
     let pin = |line| MuxPin::new(circuit, line);
     let address = |bit| pin(MuxLine::Address(bit));
-    let touch = ContactFinder::new(RamStore::new(vec![0; TABLE_BYTES]));
+    let touch = ContactFinder::new(RamStore::new([(); 2].map(|()| vec![0; TABLE_BYTES])));
     let made = match figures.wiring {
         // Five lines, as an ADG732 has them: 32 electrodes are the most that the protocol carries.
         Wiring::Transparent => {

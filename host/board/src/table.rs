@@ -14,6 +14,8 @@ use crate::session;
 /// written one at a time; its data sheet, "Flash memory programming"), or for one in 64 up to 0.4 s (4 kB behind an ESP32); all others some milliseconds.
 const PATIENCE: Duration = Duration::from_secs(6);
 const TRIES: u32 = 3;
+/// How often a table is begun at most: once more where it turns out to be another one than the board has, and once for each of two resets meanwhile.
+const MOST_BEGINNINGS: u32 = 4;
 /// Tags of commands go on from here, away from those of whoever has asked for Hello.
 const FIRST_TAG: u8 = 127;
 /// Before this version a firmware knows nothing of tables, and does not answer.
@@ -55,6 +57,17 @@ pub enum TableError {
         /// Bytes that the board keeps.
         room: usize,
     },
+    /// It forgets what it has got.
+    #[error(
+        "{link}: the board has asked for the table from the beginning again and again, the last time at byte {at}: it restarts while it writes, or its flash \
+         keeps nothing. Look for a fault of its supply (`tactomo live` names the reason of the last reset), try another cable or USB port, then another board"
+    )]
+    Forgets {
+        /// Name of the link.
+        link: String,
+        /// How far the last try came (bytes).
+        at: usize,
+    },
     /// It was refused.
     #[error(
         "{link}: the board refuses the table at byte {at}: it is damaged, of another number of electrodes or another drive, or its flash cannot be written. \
@@ -86,19 +99,24 @@ pub fn send(link: &mut dyn Link, table: &[u8], mut sent: impl FnMut(usize)) -> R
     if let Some(usable) = state.usable.filter(|usable| Some(usable.checksum) == checksum) {
         return Ok(usable);
     }
-    let mut at = 0;
+    let (mut at, mut beginnings) = (0, 1);
     loop {
         let end = table.len().min(at + MAX_PIECE);
         let bytes = table[at..end].iter().copied().collect();
         let state = talk.ask(TablePiece { at: at as u32, bytes })?;
-        if let Some(usable) = state.usable {
+        if let Some(usable) = state.usable.filter(|usable| Some(usable.checksum) == checksum) {
             return Ok(usable);
         }
-        // Where the board is: it has started anew if that is not where this piece ended.
-        at = (state.held as usize).min(table.len());
-        if at == table.len() {
-            return Err(TableError::Refused { link, at });
+        // Where the board is: it has started anew if that is before where this piece ended.
+        let held = (state.held as usize).min(table.len());
+        if held == table.len() {
+            return Err(TableError::Refused { link, at: held });
         }
+        beginnings += u32::from(held < end);
+        if beginnings > MOST_BEGINNINGS {
+            return Err(TableError::Forgets { link, at });
+        }
+        at = held;
         sent(at);
     }
 }
@@ -170,3 +188,6 @@ impl Talk<'_> {
         Ok(None)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -9,7 +9,7 @@ use tactomo_board::simulated::BoardModel;
 use tactomo_physics::detector::{Chosen, Detector, Stack};
 use tactomo_physics::forward::shell::Shell;
 use tactomo_physics::forward::{Auto, DrivingLayer, ForwardError, ForwardModel, Resolution, Slab};
-use tactomo_physics::scene::Contact;
+use tactomo_physics::scene::{Contact, Touch};
 use tactomo_touch::solve::Method;
 
 use crate::output::message;
@@ -151,7 +151,9 @@ fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
 /// A contact from `x_mm,y_mm,radius_mm,conductance_s`, with `z_mm` after `y_mm` on a curved detector.
 pub fn contact(text: &str) -> Result<Contact, String> {
     let ([x_m, y_m, z_m], [radius_mm, conductance_s]) = place_and(text, "radius_mm,conductance_s")?;
-    Ok(Contact { z_m, ..Contact::flat(x_m, y_m, radius_mm * 1e-3, conductance_s) })
+    let contact = Contact { z_m, ..Contact::flat(x_m, y_m, radius_mm * 1e-3, conductance_s) };
+    Touch::from(contact).check().map_err(|error| error.to_string())?;
+    Ok(contact)
 }
 
 /// A place (m) from `x_mm,y_mm`, or from `x_mm,y_mm,z_mm` on a curved detector, and two numbers more that have such names.
@@ -197,5 +199,6 @@ mod tests {
     fn wrong_contacts_say_what_is_allowed() {
         assert!(contact("1,2,3").is_err_and(|error| error.contains("x_mm,y_mm,radius_mm,conductance_s")));
         assert!(contact("1,2,3,much").is_err_and(|error| error.contains("`much` is not a number")));
+        assert!(contact("1,1,1,1e308").is_err_and(|error| error.starts_with("conductance_s is 1e308")));
     }
 }

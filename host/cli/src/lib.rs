@@ -1,5 +1,5 @@
-//! What `tactomo` and `tactomo-lab` share on the command line: arguments for detectors and solvers, messages and progress, files that replace no
-//! other by mistake, the log, and Ctrl-C.
+//! What `tactomo` and `tactomo-lab` share on the command line: how it is read, arguments for detectors and solvers, messages and progress, files
+//! that replace no other, the log, and Ctrl-C.
 
 #![warn(
     clippy::print_stdout,
@@ -10,6 +10,7 @@
 pub mod choice;
 pub mod interrupt;
 pub mod log;
+pub mod options;
 pub mod output;
 
 use std::process::ExitCode;

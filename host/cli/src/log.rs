@@ -1,4 +1,4 @@
-//! The log on stderr, in which a warning that comes again and again is said once, then counted.
+//! The log on stderr, in which a kind of warning that comes again and again is said a few times, then counted.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -13,9 +13,11 @@ use tracing::{Event, Level, Metadata, Subscriber};
 
 use crate::output;
 
-/// A warning that comes again within this time of the last one that was said is counted only.
+/// A warning that comes again within this time of the first of its kind is counted only.
 const SAID_EVERY: Duration = Duration::from_secs(60);
-/// Different warnings that are known at a time: more than the program has, but for names and numbers in them.
+/// Warnings of a kind that differ in a number, as that of an electrode, are said so many times in that time.
+const SAID_OF_KIND: usize = 4;
+/// Kinds of warnings that are known at a time: more than the program has, but for names in them.
 const MOST_KNOWN: usize = 256;
 
 /// The log; says at its end what is still only counted.
@@ -49,40 +51,72 @@ fn again(times: u64) -> String {
     format!("{times} {} more", if times == 1 { "time" } else { "times" })
 }
 
-/// Warnings and errors that were said, and how often each has come since.
+/// What a warning says but for its numbers, each of which is a `#`: so a kind of warning is told from others, not by what was measured.
+fn kind(message: &str) -> String {
+    let mut kind = String::with_capacity(message.len());
+    let mut characters = message.chars().peekable();
+    while let Some(c) = characters.next() {
+        if !c.is_ascii_digit() {
+            kind.push(c);
+            continue;
+        }
+        kind.push('#');
+        while characters.next_if(|c| c.is_ascii_digit() || *c == '.').is_some() {}
+    }
+    kind
+}
+
+/// Kinds of warnings and errors that were said, and how often each has come since.
 #[derive(Debug, Default)]
 struct Repeats(HashMap<String, Repeat>);
 
 #[derive(Debug)]
 struct Repeat {
-    said: Instant,
+    /// When the first of those that were said lately was.
+    began: Instant,
+    /// What was said since.
+    said: Vec<String>,
     since: u64,
 }
 
+impl Repeat {
+    fn begin(message: &str, now: Instant) -> Self {
+        Self { began: now, said: vec![message.to_owned()], since: 0 }
+    }
+}
+
 impl Repeats {
-    /// Takes note of a message: `None` if it is only counted, else how often it came since it was said last.
+    /// Takes note of a message: `None` if it is only counted, else how often its kind was counted since it was said last.
     fn take(&mut self, message: &str, now: Instant) -> Option<u64> {
-        if let Some(known) = self.0.get_mut(message) {
-            if now.saturating_duration_since(known.said) < SAID_EVERY {
-                known.since += 1;
-                return None;
+        let kind = kind(message);
+        if let Some(known) = self.0.get_mut(&kind) {
+            if now.saturating_duration_since(known.began) >= SAID_EVERY {
+                return Some(std::mem::replace(known, Repeat::begin(message, now)).since);
             }
-            known.said = now;
-            return Some(std::mem::take(&mut known.since));
+            if known.said.len() < SAID_OF_KIND && known.said.iter().all(|said| said != message) {
+                known.said.push(message.to_owned());
+                return Some(0);
+            }
+            known.since += 1;
+            return None;
         }
         if self.0.len() >= MOST_KNOWN {
-            let oldest = self.0.iter().min_by_key(|(_, repeat)| repeat.said).map(|(message, _)| message.clone());
+            let oldest = self.0.iter().min_by_key(|(_, repeat)| repeat.began).map(|(kind, _)| kind.clone());
             oldest.and_then(|oldest| self.0.remove(&oldest));
         }
-        self.0.insert(message.to_owned(), Repeat { said: now, since: 0 });
+        self.0.insert(kind, Repeat::begin(message, now));
         Some(0)
     }
 
-    /// What was counted and not said yet, in the order in which it was said first.
+    /// What was counted and not said yet, as it was said last, in the order in which kinds were said first.
     fn counted(&mut self) -> Vec<(String, u64)> {
-        let mut counted: Vec<_> = self.0.drain().filter(|(_, repeat)| repeat.since > 0).collect();
-        counted.sort_by_key(|(_, repeat)| repeat.said);
-        counted.into_iter().map(|(message, repeat)| (message, repeat.since)).collect()
+        let mut counted: Vec<_> = self.0.drain().map(|(_, repeat)| repeat).filter(|repeat| repeat.since > 0).collect();
+        counted.sort_by_key(|repeat| repeat.began);
+        let last = |Repeat { mut said, since, .. }: Repeat| {
+            let last = said.pop()?;
+            Some((if said.is_empty() { last } else { format!("{last}, and others like it") }, since))
+        };
+        counted.into_iter().filter_map(last).collect()
     }
 }
 
@@ -110,9 +144,10 @@ impl<W: Write + Send + 'static> Subscriber for Printer<W> {
         let since = if is_warning { lock(&self.repeats).take(&message.0, Instant::now()) } else { Some(0) };
         let Some(since) = since else { return };
         let note = if since == 0 { String::new() } else { format!(" ({} in the meantime)", again(since)) };
+        let words = output::message_of(&message.0);
         let line = match self.colours {
-            true => format!("\x1b[{}m{level:>5}\x1b[0m {}{note}\n", colour(level), message.0),
-            false => format!("{level:>5} {}{note}\n", message.0),
+            true => format!("\x1b[{}m{level:>5}\x1b[0m {words}{note}\n", colour(level)),
+            false => format!("{level:>5} {words}{note}\n"),
         };
         // Nobody can be told that the log cannot be written.
         drop(lock(&self.out).write_all(line.as_bytes()));
@@ -137,27 +172,15 @@ fn colour(level: Level) -> u8 {
     }
 }
 
-/// The words of an event. What a terminal would obey is written out: boards and files have a say in them.
+/// The words of an event.
 #[derive(Default)]
 struct Message(String);
-
-impl Message {
-    fn push(&mut self, text: &str) {
-        for c in text.chars() {
-            match c {
-                '\n' | '\t' => self.0.push(c),
-                c if c.is_control() => self.0.extend(c.escape_default()),
-                c => self.0.push(c),
-            }
-        }
-    }
-}
 
 impl Visit for Message {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
         match field.name() {
-            "message" => self.push(&format!("{value:?}")),
-            name => self.push(&format!(" {name}={value:?}")),
+            "message" => self.0.push_str(&format!("{value:?}")),
+            name => self.0.push_str(&format!(" {name}={value:?}")),
         }
     }
 }
@@ -180,14 +203,30 @@ mod tests {
     }
 
     #[test]
+    fn warnings_are_told_apart_by_their_kind_not_by_the_numbers_in_them() {
+        let mut repeats = Repeats::default();
+        let begin = Instant::now();
+        let say = |repeats: &mut Repeats, mv: u32, seconds| {
+            let message = format!("Not re-zeroed: {mv}.5 mV at electrode 3");
+            repeats.take(&message, begin + Duration::from_secs(seconds))
+        };
+        let said = (0..750).filter(|i| say(&mut repeats, 286 + i, 1).is_some()).count();
+        assert_eq!(said, SAID_OF_KIND);
+        assert_eq!(repeats.take("the board is back", begin), Some(0), "another kind is said");
+        assert_eq!(say(&mut repeats, 1036, 61), Some(750 - SAID_OF_KIND as u64));
+        assert_eq!(repeats.counted(), []);
+    }
+
+    #[test]
     fn the_oldest_are_forgotten() {
         let mut repeats = Repeats::default();
         let begin = Instant::now();
-        for i in 0..2 * MOST_KNOWN as u32 {
-            assert_eq!(repeats.take(&format!("warning {i}"), begin + Duration::from_millis(i.into())), Some(0));
+        let of_kind = |i: usize| "x".repeat(i);
+        for i in 0..2 * MOST_KNOWN {
+            assert_eq!(repeats.take(&of_kind(i), begin + Duration::from_millis(i as u64)), Some(0));
         }
         assert_eq!(repeats.0.len(), MOST_KNOWN);
-        assert!(repeats.take(&format!("warning {}", 2 * MOST_KNOWN - 1), begin).is_none());
+        assert!(repeats.take(&of_kind(2 * MOST_KNOWN - 1), begin).is_none());
     }
 
     #[test]
@@ -215,10 +254,10 @@ mod tests {
         });
         let text = String::from_utf8(written.0.lock().unwrap().clone()).unwrap();
         let lines: Vec<_> = text.lines().collect();
-        let found = " INFO found 3\\u{1b}[2J";
+        let found = " INFO found 3\\u001b[2J";
         let expected = [" WARN electrode 3 is left out", found, found];
         assert_eq!(lines[..3], expected, "{text}");
         assert_eq!(lines.len(), 6, "{text}");
-        assert_eq!(lock(&repeats).counted().len(), 2);
+        assert_eq!(lock(&repeats).counted(), [("electrode 5 is left out, and others like it".to_owned(), 16)]);
     }
 }

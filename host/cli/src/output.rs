@@ -3,13 +3,13 @@
 //! Machine output and tables go to stdout, messages to stderr. Whoever reads them may have seen enough and close the pipe, as `head`
 //! does: that is no error, and nothing here panics of it.
 
+use std::borrow::Cow;
 use std::fmt::Arguments;
-use std::fs::File;
-use std::io::{self, BufWriter, ErrorKind, IsTerminal, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail, ensure};
+pub use tactomo_physics::new_file::NewFile;
 
 /// Prints a message on stderr, as `eprintln!` does, but without a panic where stderr is closed.
 #[macro_export]
@@ -18,14 +18,45 @@ macro_rules! message {
 }
 pub use crate::message;
 
+/// Longest line of a message (characters), a few lines of a terminal. A longer one quotes what somebody wrote, and its middle is left out.
+const LONGEST_LINE: usize = 500;
+
 /// Prints a line or lines on stderr. Where stderr is closed, nobody reads it.
 pub fn print_message(text: Arguments) {
-    drop(writeln!(io::stderr(), "{text}"));
+    drop(writeln!(io::stderr(), "{}", message_of(&text.to_string())));
 }
 
 /// Prints a line or lines on stdout.
 pub fn print(text: &str) -> io::Result<()> {
-    unless_closed(writeln!(io::stdout(), "{text}")).map(drop)
+    unless_closed(writeln!(io::stdout(), "{}", harmless(text))).map(drop)
+}
+
+/// A text that a terminal shows as it is: files, boards and the wire have a say in it. What a terminal would obey, and what turns the order of
+/// letters, is written out, as JSON writes it.
+pub fn harmless(text: &str) -> Cow<'_, str> {
+    let is_obeyed = |c: char| {
+        (c.is_control() && !matches!(c, '\n' | '\t')) || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(is_obeyed) {
+        return Cow::Borrowed(text);
+    }
+    let written = |c: char| if is_obeyed(c) { format!("\\u{:04x}", u32::from(c)) } else { c.into() };
+    Cow::Owned(text.chars().map(written).collect())
+}
+
+/// A message as it is printed: [`harmless`], and without the middle of lines that are too long to be read.
+pub(crate) fn message_of(text: &str) -> String {
+    let cut = |line: &str| {
+        let length = line.chars().count();
+        if length <= LONGEST_LINE {
+            return line.to_owned();
+        }
+        let (first, last) = (LONGEST_LINE * 2 / 3, LONGEST_LINE / 3);
+        let (begin, end): (String, String) =
+            (line.chars().take(first).collect(), line.chars().skip(length - last).collect());
+        format!("{begin} [... {} characters ...] {end}", length - first - last)
+    };
+    harmless(text).split('\n').map(cut).collect::<Vec<_>>().join("\n")
 }
 
 /// Whether anybody still reads what was written.
@@ -103,94 +134,6 @@ fn bar(what: &str, done: u64, all: u64, elapsed: Duration) -> String {
     format!("[{full}{empty}] {done} of {all} {what}, about {:.0} s left", left.as_secs_f64().ceil())
 }
 
-/// A file to write. It has its name only once it is complete, and replaces another one only if that is wanted.
-#[derive(Debug)]
-pub struct NewFile {
-    path: PathBuf,
-    /// Where it is written until it is complete.
-    unfinished: PathBuf,
-}
-
-impl NewFile {
-    /// Checks that a file can be written, before the work for it begins. `overwrite` replaces one that exists.
-    pub fn new(path: &Path, overwrite: bool) -> anyhow::Result<Self> {
-        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        if path.is_dir() {
-            bail!("cannot write {}: it is a folder", path.display());
-        }
-        // A device or a pipe is written to, not replaced.
-        if path.exists() && !path.is_file() {
-            return Ok(Self { unfinished: path.clone(), path });
-        }
-        if path.exists() && !overwrite {
-            bail!("{} exists already: give another name, or --overwrite to replace it", path.display());
-        }
-        let mut unfinished = path.clone().into_os_string();
-        unfinished.push(".unfinished");
-        let file = Self { path, unfinished: unfinished.into() };
-        file.create()?;
-        // Whoever is ended before there is anything to write leaves no empty file.
-        drop(std::fs::remove_file(&file.unfinished));
-        Ok(file)
-    }
-
-    /// The same for a file of a kind that never replaces another one.
-    pub fn never_replacing(path: &Path) -> anyhow::Result<Self> {
-        ensure!(!path.exists(), "{} exists already, and is not replaced: give another name", path.display());
-        Self::new(path, false)
-    }
-
-    /// The same for a file that is made from `input`, which it must not replace.
-    pub fn beside(input: &Path, path: &Path, overwrite: bool) -> anyhow::Result<Self> {
-        let is_same = matches!((input.canonicalize(), path.canonicalize()), (Ok(one), Ok(other)) if one == other);
-        ensure!(!is_same, "{} is the file that is read: give --out another name", path.display());
-        Self::new(path, overwrite)
-    }
-
-    /// The same for a file that may be wanted.
-    pub fn optional(path: Option<&PathBuf>, overwrite: bool) -> anyhow::Result<Option<Self>> {
-        path.map(|path| Self::new(path, overwrite)).transpose()
-    }
-
-    /// Where to write until it is complete.
-    pub fn unfinished_path(&self) -> &Path {
-        &self.unfinished
-    }
-
-    /// Opens it for writing.
-    pub fn create(&self) -> anyhow::Result<BufWriter<File>> {
-        let file = File::create(&self.unfinished).with_context(|| format!("cannot write {}", self.path.display()))?;
-        Ok(BufWriter::new(file))
-    }
-
-    /// Gives it its name; it is complete.
-    pub fn finish(self) -> anyhow::Result<()> {
-        if self.unfinished != self.path {
-            std::fs::rename(&self.unfinished, &self.path)
-                .with_context(|| format!("cannot write {}", self.path.display()))?;
-        }
-        Ok(())
-    }
-
-    /// Writes all of it.
-    pub fn write(self, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
-        let mut out = self.create()?;
-        out.write_all(content.as_ref())
-            .and_then(|()| out.flush())
-            .with_context(|| format!("cannot write {}", self.path.display()))?;
-        self.finish()
-    }
-}
-
-impl Drop for NewFile {
-    /// Leaves nothing of a file that was not completed.
-    fn drop(&mut self) {
-        if self.unfinished != self.path {
-            drop(std::fs::remove_file(&self.unfinished));
-        }
-    }
-}
-
 /// The command that runs now, as one would type it: for reports.
 pub fn command_line() -> String {
     let quoted = |word: String| if word.contains(char::is_whitespace) { format!("'{word}'") } else { word };
@@ -204,8 +147,21 @@ pub fn command_line() -> String {
 mod tests {
     use super::*;
 
-    fn path(name: &str) -> PathBuf {
-        std::env::temp_dir().join(format!("tactomo-{}-output-{name}", std::process::id()))
+    #[test]
+    fn what_a_terminal_would_obey_is_written_out_and_all_else_stays() {
+        assert_eq!(harmless("a\tb\n\u{e9} \u{20ac}"), "a\tb\n\u{e9} \u{20ac}");
+        assert_eq!(harmless("\x1b[2J\r\u{7}\u{9b}1m\u{202e}\u{7f}"), r"\u001b[2J\u000d\u0007\u009b1m\u202e\u007f");
+    }
+
+    #[test]
+    fn a_message_leaves_out_the_middle_of_what_it_quotes() {
+        let told =
+            message_of(&format!("line 1: {}: a number is needed\n{}\nshort", "x".repeat(3 << 20), " ".repeat(3 << 20)));
+        assert!(told.len() < 3 * LONGEST_LINE, "{}", told.len());
+        assert!(
+            told.starts_with("line 1: xxx") && told.contains("xxx: a number is needed\n") && told.ends_with("\nshort")
+        );
+        assert!(told.contains("[... 3145257 characters ...]"), "{told}");
     }
 
     #[test]
@@ -213,45 +169,5 @@ mod tests {
         let line = bar("frames", 250, 1000, Duration::from_secs(4));
         assert_eq!(line, "[#######-----------------------] 250 of 1000 frames, about 12 s left");
         assert!(bar("frames", 1003, 1000, Duration::from_secs(4)).starts_with(&format!("[{}] 1003", "#".repeat(30))));
-    }
-
-    #[test]
-    fn a_file_is_replaced_only_if_that_is_wanted() -> anyhow::Result<()> {
-        let path = path("kept");
-        NewFile::new(&path, false)?.write("one")?;
-        let refused = NewFile::new(&path, false).map_or_else(|error| error.to_string(), |_| String::new());
-        assert!(refused.contains("exists already") && refused.contains("--overwrite"), "{refused}");
-        assert_eq!(std::fs::read_to_string(&path)?, "one");
-        NewFile::new(&path, true)?.write("two")?;
-        assert_eq!(std::fs::read_to_string(&path)?, "two");
-        Ok(std::fs::remove_file(&path)?)
-    }
-
-    #[test]
-    fn a_file_that_is_not_completed_leaves_the_one_before_and_nothing_else() -> anyhow::Result<()> {
-        let path = path("broken");
-        std::fs::write(&path, "whole")?;
-        let file = NewFile::new(&path, true)?;
-        file.create()?.write_all(b"half")?;
-        let unfinished = file.unfinished_path().to_owned();
-        assert!(unfinished.exists());
-        drop(file);
-        assert!(!unfinished.exists());
-        assert_eq!(std::fs::read_to_string(&path)?, "whole");
-        Ok(std::fs::remove_file(&path)?)
-    }
-
-    #[test]
-    fn folders_and_missing_folders_are_refused_at_once() {
-        let refused = |path: &Path| NewFile::new(path, true).map_or_else(|error| error.to_string(), |_| String::new());
-        assert!(refused(&std::env::temp_dir()).contains("is a folder"));
-        assert!(refused(Path::new("no/such/folder/a.csv")).contains("cannot write no/such/folder/a.csv"));
-    }
-
-    #[test]
-    fn a_device_is_written_to_and_stays_one() -> anyhow::Result<()> {
-        NewFile::new(Path::new("/dev/null"), false)?.write("gone")?;
-        assert!(!Path::new("/dev/null").is_file());
-        Ok(())
     }
 }

@@ -14,6 +14,7 @@ pub mod detector;
 pub mod forward;
 pub mod geometry;
 pub mod hertz;
+pub mod new_file;
 pub mod readings;
 pub mod scene;
 pub mod simulate;

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use tactomo::detector::Detector as Described;
 use tactomo::forward::{Auto, ForwardError, ForwardModel, readings_v, touched_impedance_ohm};
-use tactomo::hertz::Hertz;
+use tactomo::hertz::{self, Hertz};
 use tactomo::nalgebra::DMatrix;
 use tactomo::readings::Readings;
 use tactomo::scene::{Contact as Disc, Touch};
@@ -38,8 +38,10 @@ pub struct Contact {
 impl Contact {
     #[new]
     #[pyo3(signature = (x_m, y_m, radius_m, conductance_s, z_m = 0.0))]
-    fn new(x_m: f64, y_m: f64, radius_m: f64, conductance_s: f64, z_m: f64) -> Self {
-        Self { x_m, y_m, z_m, radius_m, conductance_s }
+    fn new(x_m: f64, y_m: f64, radius_m: f64, conductance_s: f64, z_m: f64) -> PyResult<Self> {
+        let contact = Self { x_m, y_m, z_m, radius_m, conductance_s };
+        Touch::from(contact).check().map_err(raised)?;
+        Ok(contact)
     }
 
     /// The contact under a ball of `radius_m` (m) that is pressed on a detector with `force_n` (N): by Hertz's theory and what the detector's file
@@ -55,9 +57,7 @@ impl Contact {
         force_n: f64,
         z_m: f64,
     ) -> PyResult<Self> {
-        if !(radius_m > 0.0 && force_n > 0.0 && radius_m.is_finite() && force_n.is_finite()) {
-            return Err(refused("radius_m and force_n: numbers above zero are needed"));
-        }
+        hertz::check_press(radius_m, force_n).map_err(raised)?;
         let skin = detector.0.skin.ok_or_else(|| {
             refused(format!(
                 "forces need to know how soft {} is: take detector.in_material(\"A\"), or write young_pa in a table [skin] of its file",
@@ -100,10 +100,12 @@ fn touch(given: &Bound<'_, PyAny>, index: usize) -> PyResult<Touch> {
         return Ok((*contact.get()).into());
     }
     if let Ok([x_m, y_m, radius_m, conductance_s]) = given.extract::<[f64; 4]>() {
-        return Ok(Contact::new(x_m, y_m, radius_m, conductance_s, 0.0).into());
+        let touch = Contact::new(x_m, y_m, radius_m, conductance_s, 0.0).map(Touch::from);
+        return touch.map_err(|error| refused(format!("contact {index}: {}", error.value(given.py()))));
     }
     let text = given.py().import("json")?.call_method1("dumps", (given,));
     let touch = text.and_then(|text| serde_json::from_str(text.extract()?).map_err(raised));
+    let touch = touch.and_then(|touch: Touch| touch.check().map(|()| touch).map_err(raised));
     touch.map_err(|error| {
         refused(format!(
             "contact {index}: a Contact, four numbers (x_m, y_m, radius_m, conductance_s), or a touch such as {{\"centre_m\": [0, 0], \

@@ -3,7 +3,7 @@
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use tactomo::schema::CONTACT_COLUMNS;
+use tactomo::schema::{CONTACT_COLUMNS, Kind, word};
 
 use crate::recording::Recording;
 use crate::solutions::{FLAGS, Solutions};
@@ -13,8 +13,8 @@ const READINGS: [&str; 3] = ["frame", "ground", "electrode"];
 
 #[pymethods]
 impl Solutions {
-    /// A `pandas.DataFrame` with a row for each contact: its index is `(frame, contact)`, its columns are those of `tactomo.CONTACT_FIELDS`.
-    /// Needs pandas.
+    /// A `pandas.DataFrame` with a row for each contact: its index is `(frame, contact)`, its columns are those of `tactomo.CONTACT_FIELDS`,
+    /// each of its own kind, also where nothing is known: numbers, `Int64`, `boolean` or `string`. Needs pandas.
     fn to_pandas<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let pandas = py.import("pandas")?;
         let contacts = || self.answers.iter().flat_map(|answer| &answer.contacts);
@@ -28,8 +28,19 @@ impl Solutions {
         let index = pandas.getattr("MultiIndex")?.call_method("from_arrays", (axes,), Some(&names))?;
         let columns = PyDict::new(py);
         for column in &CONTACT_COLUMNS {
-            let values = contacts().map(|contact| column.value(contact).unwrap_or(f64::NAN));
-            columns.set_item(column.name, PyArray1::from_iter(py, values))?;
+            let values = || contacts().map(|contact| column.value(contact));
+            let numbers = || PyArray1::from_iter(py, values().map(|value| value.unwrap_or(f64::NAN)));
+            // Of pandas' own kinds, which know what is not known: so a column keeps its kind where nothing is.
+            let (values, kind) = match column.kind {
+                Kind::Number => (numbers().into_any(), "float64"),
+                Kind::Integer => (numbers().into_any(), "Int64"),
+                Kind::Flag => (numbers().into_any(), "boolean"),
+                Kind::Word(words) => {
+                    let words = values().map(|value| value.map(|value| word(words, value)));
+                    (PyList::new(py, words.collect::<Vec<_>>())?.into_any(), "string")
+                }
+            };
+            columns.set_item(column.name, pandas.getattr("array")?.call1((values, kind))?)?;
         }
         pandas.getattr("DataFrame")?.call1((columns, index))
     }

@@ -113,7 +113,7 @@ def test_what_is_learned_is_kept_for_the_next_time(tmp_path):
     with tactomo.Live(seconds=90, **options) as run:
         while not kept.exists() and run.next(1.0):
             pass
-    with tactomo.Live(seconds=2, **options) as run:
+    with tactomo.Live(seconds=10, **options) as run:
         assert sum(1 for _ in run) > 0
     assert run.summary["learned"]["presses"] >= 5
     kept.write_text("nonsense")

@@ -136,12 +136,17 @@ def test_ctrl_c_stops_it(in_sequence, detector, frames):
         solver.solve_many(many, in_sequence=in_sequence)
 
 
-def test_a_data_frame_has_a_row_for_each_contact(found):
+def test_a_data_frame_has_a_row_for_each_contact(found, detector, frames):
     pytest.importorskip("pandas")
     table = found.to_pandas()
     assert table.index.names == ["frame", "contact"] and len(table) == found.count.sum()
     assert tuple(table.columns) == tactomo.CONTACT_FIELDS
     assert table.loc[(2, 1), "x_m"] == found.array["x_m"][2, 1]
+    kinds = {"id": "Int64", "x_m": "float64", "force_n": "float64", "force_beyond_maximum": "boolean", "state": "string"}
+    nothing = tactomo.Solver("contacts", detector).solve_many(np.zeros_like(frames)).to_pandas()
+    assert len(nothing) == 0
+    for some in (table, nothing):
+        assert {name: str(some.dtypes[name]) for name in kinds} == kinds
     assert table.groupby("frame").size().to_dict() == {index: count for index, count in enumerate(found.count) if count}
 
 

@@ -54,8 +54,19 @@ def test_a_ball_in_newtons_is_a_contact_that_grows_with_the_force(detector):
     hard = tactomo.Detector.from_toml(detector.to_toml().split("[skin]")[0])
     with pytest.raises(tactomo.TactomoError, match=r"how soft .* is: .*\[skin\]"):
         tactomo.Contact.ball(hard, 0.0, 0.0, 0.008, 1.0)
-    with pytest.raises(tactomo.TactomoError, match="above zero"):
+    with pytest.raises(tactomo.TactomoError, match="a force from 1e-6 N to 10000.0 N: 0.008 m and 0.0 N are given"):
         tactomo.Contact.ball(detector, 0.0, 0.0, 0.008, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "told"),
+    [((0, 0, 0.003, -1), "conductance_s is -1.0"), ((1e308, 0, 0.003, 1e-3), "x_m is 1e308"), ((0, 0, 0, 1e-3), "radius_m is 0.0")],
+)
+def test_numbers_that_no_press_has_are_refused_with_what_is_sensible(numbers, told, model):
+    with pytest.raises(tactomo.TactomoError, match=f"^{told}, but has to be from "):
+        tactomo.Contact(*numbers)
+    with pytest.raises(tactomo.TactomoError, match=f"^contact 0: {told}, but has to be from "):
+        model.forward([numbers])
 
 
 def test_a_simulator_measures_with_noise_by_another_model(detector, model, simulator):

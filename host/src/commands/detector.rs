@@ -57,9 +57,6 @@ struct CompileArgs {
     /// Writes the table there
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Replaces the file if it exists
-    #[arg(long, visible_alias = "force")]
-    overwrite: bool,
     /// Prints `{detector, file, bytes, electrodes}` as JSON
     #[arg(long)]
     json: bool,
@@ -86,9 +83,6 @@ struct ShowArgs {
     /// Draws it into an SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Replaces the file if it exists
-    #[arg(long, requires = "svg", visible_alias = "force")]
-    overwrite: bool,
     /// Prints it as a TOML file
     #[arg(long, conflicts_with = "json")]
     toml: bool,
@@ -117,7 +111,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
 }
 
 fn compile(args: CompileArgs) -> anyhow::Result<()> {
-    let out = NewFile::new(&args.out, args.overwrite)?;
+    let out = NewFile::new(&args.out)?;
     let detector = DetectorArgs { detector: Some(args.detector), material: args.material }.get()?;
     let bytes = solve::compile(&Problem::of(&detector)?)?;
     out.write(&bytes)?;
@@ -157,7 +151,7 @@ fn show(args: ShowArgs) -> anyhow::Result<()> {
     let described = DetectorArgs { detector: Some(args.detector), material: args.material }.get()?;
     let detector = args.as_built.of(&described)?;
     if let Some(path) = &args.svg {
-        NewFile::new(path, args.overwrite)?.write(detector.to_svg())?;
+        NewFile::new(path)?.write(detector.to_svg())?;
         message!("drew {} in {}", detector.name, path.display());
     }
     // What was built is for a machine to use.

@@ -8,7 +8,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{bail, ensure};
 use tactomo::schema::FrameReport;
 use tactomo::sink::lines::Fields;
 use tactomo::sink::mcap::McapFile;
@@ -74,9 +74,6 @@ pub struct Args {
     /// Makes a pointer of a contact, as live --pointer does: its motion, presses and clicks are the frames' events
     #[arg(long)]
     pointer: bool,
-    /// Replaces the file if it exists
-    #[arg(long, visible_alias = "force")]
-    overwrite: bool,
 }
 
 /// Forms of a file.
@@ -133,7 +130,7 @@ enum Out {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let stop = interrupt::flag()?;
     let files = args.checked()?;
-    let out = args.out_beside(&files)?;
+    let out = NewFile::new(&args.out)?;
     let places = args.places()?;
     let open = |(name, file): &(String, PathBuf)| {
         let place = places.iter().find(|(patch, _)| patch == name).map(|(_, place)| *place);
@@ -189,19 +186,11 @@ impl Args {
 
     /// Where the detectors of a folder lie on a body, by name, as far as its skin's file tells.
     fn places(&self) -> anyhow::Result<Vec<(String, Place)>> {
-        let path = self.file.join(SKIN);
-        if !path.is_file() {
+        if self.file.join(SKIN).symlink_metadata().is_err() {
             return Ok(Vec::new());
         }
         let placed = |Patch { name, place, .. }| Some((name, place?));
-        Ok(skin::read(&path)?.into_iter().filter_map(placed).collect())
-    }
-
-    /// The file to write, which is none of those that are read.
-    fn out_beside(&self, files: &[(String, PathBuf)]) -> anyhow::Result<NewFile> {
-        let beside = |(_, file): &(String, PathBuf)| NewFile::beside(file, &self.out, self.overwrite);
-        let checked = files.iter().map(beside).collect::<anyhow::Result<Vec<_>>>()?;
-        checked.into_iter().next().context("no recording")
+        Ok(skin::read(&self.file)?.into_iter().filter_map(placed).collect())
     }
 
     fn input<'a>(&'a self, file: &'a Path) -> Input<'a> {
@@ -231,11 +220,11 @@ impl Out {
                 let streamed = recordings.iter().map(Recording::streamed).collect::<anyhow::Result<Vec<_>>>()?;
                 let (messages, about) = Streamed::parts(streamed);
                 if profile == Profile::Foxglove {
-                    let mcap = McapFile::new(file.create()?, messages, about)?;
+                    let mcap = McapFile::new(file.create()?, messages, about).map_err(|error| file.failed(error))?;
                     return Ok(Self::Mcap(Box::new(mcap), file));
                 }
                 let detectors = recordings.iter().filter_map(Recording::named).collect();
-                let mcap = Ros2File::new(file.create()?, detectors, &about)?;
+                let mcap = Ros2File::new(file.create()?, detectors, &about).map_err(|error| file.failed(error))?;
                 return Ok(Self::Ros2(Box::new(mcap), file));
             }
         };
@@ -244,8 +233,8 @@ impl Out {
 
     fn write(&mut self, Answer { delivery, number }: &Answer, fields: Fields) -> anyhow::Result<()> {
         match self {
-            Self::Mcap(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
-            Self::Ros2(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
+            Self::Mcap(mcap, file) => Ok(mcap.write(delivery).map_err(|error| file.failed(error))?),
+            Self::Ros2(mcap, file) => Ok(mcap.write(delivery).map_err(|error| file.failed(error))?),
             Self::Table(writer) => {
                 let report = FrameReport { frame: Some(*number), ..fields.of(delivery) };
                 writer.write(&report).map(drop)
@@ -256,12 +245,12 @@ impl Out {
     fn finish(self, recordings: &[Recording]) -> anyhow::Result<()> {
         match self {
             Self::Mcap(mcap, file) => {
-                mcap.finish().context("cannot write the MCAP file")?;
-                file.finish()
+                mcap.finish().map_err(|error| file.failed(error))?;
+                Ok(file.finish()?)
             }
             Self::Ros2(mcap, file) => {
-                mcap.finish().context("cannot write the MCAP file")?;
-                file.finish()
+                mcap.finish().map_err(|error| file.failed(error))?;
+                Ok(file.finish()?)
             }
             // What has a mesh in it is of one detector.
             Self::Table(writer) => writer.finish(recordings.first().and_then(Recording::mesh)),

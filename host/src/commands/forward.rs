@@ -15,6 +15,7 @@ use tactomo::simulate::{self, Foam, Measurement, Pressed};
 use super::as_built::AsBuiltArgs;
 use super::scene::{self, Press, SceneArgs};
 use tactomo_cli::choice::{self, DetectorArgs, Model};
+use tactomo_cli::options;
 use tactomo_cli::output::{self, NewFile, message};
 
 /// Computes the readings of a detector for given contacts, or saves its Jacobian.
@@ -44,7 +45,7 @@ pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
     /// Time in the scene, and of what creeps or drifts (s); contacts, presses and touches are held from time 0
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = scene::time_s)]
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = options::time_s())]
     time: f64,
     /// Adds the converter's noise and rounds to its steps
     #[arg(long)]
@@ -58,9 +59,6 @@ pub struct Args {
     /// Saves the Jacobian to a file, for `live --jacobian`
     #[arg(long, value_name = "FILE", conflicts_with = AsBuiltArgs::NAME)]
     save_jacobian: Option<PathBuf>,
-    /// Replaces the file if it exists
-    #[arg(long, requires = "save_jacobian")]
-    overwrite: bool,
     /// Prints `{model, detector, as_built?, image_nodes, touches, faults, readings_v, impedance_ohm}` as JSON
     #[arg(long)]
     json: bool,
@@ -92,12 +90,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         "nothing to compute: give --contact, --press, --touches, --scene (at a time when something touches) or --save-jacobian"
     );
     ensure!(!(leaks && saves), "a detector that leaks has no Jacobian at no contact: leave out --fault leak");
-    let jacobian = NewFile::optional(args.save_jacobian.as_ref(), args.overwrite)?;
+    let jacobian = NewFile::optional(args.save_jacobian.as_ref())?;
     let built = args.scene.as_built.of(&detector)?;
     let model = model(args, &built)?;
     if let (Some(file), Some(path)) = (jacobian, &args.save_jacobian) {
-        Jacobian::of(&*model).save(file.unfinished_path())?;
-        file.finish()?;
+        file.write(Jacobian::of(&*model).to_bytes()?)?;
         message!("saved the Jacobian of {} ({}) to {}", detector.name, model.name(), path.display());
     }
     if !computes {

@@ -4,6 +4,7 @@ mod several;
 pub mod skin;
 mod together;
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -16,14 +17,14 @@ use tactomo::detector::{Chosen, Detector};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
 use tactomo::run::Listener;
-use tactomo::run::calibration::Learning;
+use tactomo::run::calibration::{Keeping, Learning};
 use tactomo::run::options::{RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::table::{BoardTable, WithTable};
+use tactomo::run::table::{BoardTable, What, WithTable};
 use tactomo::scene::SceneName;
 use tactomo::sink::address::Address;
 use tactomo::sink::door::{Door, Origin};
-use tactomo::sink::page::{Finger, Listen, Server, Shown};
+use tactomo::sink::page::{Finger, Listen, Server, Shown, code};
 use tactomo::sink::place::Place;
 use tactomo::solve::{Method, Problem};
 
@@ -32,6 +33,7 @@ use super::source::{self, BoardArgs};
 use super::streams::StreamArgs;
 use super::{browser, keep};
 use tactomo_cli::choice::{DetectorArgs, Model};
+use tactomo_cli::options;
 use tactomo_cli::output::message;
 use tactomo_protocol::Output;
 
@@ -46,7 +48,7 @@ const PORT: &str = "Serial port of the board, or the serial number of its USB de
 /// Examples:
 ///   tactomo live                                    finds the board and serves the page
 ///   tactomo live --simulate                         without hardware
-///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
+///   tactomo live --simulate --scene five-fingers --force 10 --fault open:3
 ///   tactomo live --simulate --scene gripper         a demonstration, on the detector that it was made for
 ///   tactomo live --simulate --board esp32           at the pace and with the ADCs of the paper's board
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
@@ -88,7 +90,7 @@ pub struct Args {
     #[arg(long, value_name = "WHAT", default_value = "frames", value_parser = output(), conflicts_with = "replay")]
     pub board_sends: Output,
     /// Ends this many seconds after the board said Hello
-    #[arg(long, value_parser = source::seconds)]
+    #[arg(long, value_parser = options::seconds)]
     pub seconds: Option<Duration>,
     /// Keeps all bytes that come in a new file; of several boards in a new folder, with a file for each, which --skin FOLDER shows again
     #[arg(long, value_name = "FILE")]
@@ -131,7 +133,8 @@ pub struct PictureArgs {
     #[arg(long)]
     pub no_open: bool,
     /// Takes the detector as it is described. Else, on a board, it is learned from what presses, and used once it helps. What is learned of a
-    /// detector that a file describes is kept beside it, my.learned.toml of my.toml, for the next time
+    /// detector that a file describes is kept beside it for the next time, for each board in a file of its own: of my.toml in my.BOARD.learned.toml, where
+    /// BOARD is the serial number of its USB device, or its port
     #[arg(long)]
     pub no_learning: bool,
     /// Makes a pointer of a contact: its motion, presses and clicks are `events` in `--stream`, and move a cursor on the page. The scene
@@ -178,11 +181,11 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let Some(detectors) = several::detectors(&args)? else { return show(prepared(args)?) };
+    let Some(detectors) = several::detectors(&args)? else { return show(prepared(args, "")?) };
     let of_patch = |Patch { name, place, args: patch }| {
         let PictureArgs { http_port, listen, allow_origin, no_open, json, .. } = args.picture.clone();
         let picture = PictureArgs { http_port, listen, allow_origin, no_open, json, ..patch.picture };
-        let show = prepared(Args { picture, seconds: args.seconds, ..patch });
+        let show = prepared(Args { picture, seconds: args.seconds, ..patch }, &name);
         let show = show.with_context(|| format!("patch {name}"))?;
         Ok((name, Show { place, ..show }))
     };
@@ -190,15 +193,14 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     together::show_all(shows, Some(&args.streams))
 }
 
-/// What one detector is shown by.
-fn prepared(args: Args) -> anyhow::Result<Show> {
+/// What one detector is shown by, that has such a name among several.
+fn prepared(args: Args, patch: &str) -> anyhow::Result<Show> {
     let chosen = &args.picture.detector;
     let detector = match &args.replay {
         Some(path) => source::recorded_detector(chosen, path)?,
         None => source::described(&args.board, chosen.get_or(args.board.scene.preset())?),
     };
-    let learning = learning(&args, &detector);
-    let detector = kept(learning.as_ref()).unwrap_or(detector);
+    let learning = learning(&args, &detector, patch);
     let (source, finger) = match args.replay {
         Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &detector)?,
@@ -206,7 +208,11 @@ fn prepared(args: Args) -> anyhow::Result<Show> {
     let output = args.board_sends;
     let table = BoardTable::default();
     let source = match output.has_contacts() {
-        true => Box::new(WithTable::new(source, detector.clone(), table.clone())),
+        true => {
+            let of_description = || What::Detector(Box::new(detector.clone()));
+            let what = learning.clone().map_or_else(of_description, |learning| What::Learned(Box::new(learning)));
+            Box::new(WithTable::new(source, what, table.clone()))
+        }
         false => source,
     };
     let settings = args.board.settings.requested();
@@ -236,31 +242,20 @@ fn prepared(args: Args) -> anyhow::Result<Show> {
 }
 
 /// How the detector is learned, if it is.
-fn learning(args: &Args, description: &Detector) -> Option<Learning> {
+fn learning(args: &Args, description: &Detector, patch: &str) -> Option<Learning> {
     let PictureArgs { no_learning, learned, jacobian, detector, .. } = &args.picture;
     // What a person has brought in place of the model holds for the detector as it is described.
     if *no_learning || learned.is_some() || jacobian.is_some() || args.replay.is_some() {
         return None;
     }
-    let file = match &detector.detector {
+    let keeping = match &detector.detector {
         // No two simulations are of one sensor.
-        Some(Chosen::File(path)) if !args.board.is_simulated() => Some(path.as_path()),
-        _ => None,
+        Some(Chosen::File(path)) if !args.board.is_simulated() => {
+            Keeping::Beside { description: path.clone(), patch: patch.to_owned() }
+        }
+        _ => Keeping::Nowhere,
     };
-    Learning::of(description, file)
-}
-
-/// The detector as a run before has learned it, if one has.
-fn kept(learning: Option<&Learning>) -> Option<Detector> {
-    let Learning { file, .. } = learning?;
-    let kept = learning?.kept();
-    if let (Ok(Some(_)), Some(file)) = (&kept, file) {
-        message!("what was learned before is used: {}; --no-learning leaves it out", file.display());
-    }
-    kept.unwrap_or_else(|error| {
-        message!("what was learned before cannot be used, so it is learned anew: {error}");
-        None
-    })
+    Learning::of(description, keeping)
 }
 
 /// What a board sends, by its name.
@@ -333,6 +328,7 @@ fn serve(picture: &PictureArgs, all: Vec<Shown>) -> anyhow::Result<Option<Server
     message!("live picture: {}", server.url());
     if let Some(url) = server.shared_url() {
         message!("on the network: {url}\nwho has this address can see the page and press its buttons");
+        message!("{}", code::lines(url, std::io::stderr().is_terminal()));
     }
     if !no_open {
         browser::open(&server.url());

@@ -13,7 +13,8 @@ use super::calibrate::force::gather::{Gathered, gather};
 use super::calibrate::force::known::measured;
 use super::calibrate::force::report::{ReportedPress, scatter_line, siemens, three};
 use super::calibrate::write;
-use super::scene::positive;
+use super::scene::{elasticity, poisson};
+use tactomo_cli::options;
 use tactomo_cli::output::{self, NewFile, message};
 
 /// Measures what a foam of one's own is to the touch.
@@ -50,16 +51,16 @@ struct FitArgs {
     #[command(flatten)]
     presses: PressArgs,
     /// Radius of the tip (mm)
-    #[arg(long, value_name = "MM", value_parser = positive)]
+    #[arg(long, value_name = "MM", value_parser = options::tip())]
     tip: f64,
     /// The tip is flat, not a ball
     #[arg(long)]
     flat: bool,
     /// Young's modulus of the detector (MPa) [default: that of its foams or of its file]
-    #[arg(long, value_name = "MPA", value_parser = positive)]
+    #[arg(long, value_name = "MPA", value_parser = elasticity())]
     elasticity: Option<f64>,
     /// Poisson's ratio of the detector [default: that of its file, or 0.3]
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", value_parser = poisson())]
     poisson: Option<f64>,
     /// Writes the detector with this skin; a file that exists is not replaced
     #[arg(long, value_name = "FILE.toml")]
@@ -77,8 +78,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn fit(args: &FitArgs) -> anyhow::Result<()> {
-    let out =
-        args.out.as_deref().map(|path| Ok::<_, anyhow::Error>((path, NewFile::never_replacing(path)?))).transpose()?;
+    let out = args.out.as_deref().map(|path| Ok::<_, anyhow::Error>((path, NewFile::new(path)?))).transpose()?;
     let Gathered { detector, presses } = args.gathered()?;
     let own: Vec<ForcePress> = presses.iter().map(|press| press.press).collect();
     let fit = fit_skin(&own, args.tip(), &detector, args.skin(&detector)?)

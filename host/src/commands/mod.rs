@@ -21,7 +21,7 @@ mod streams;
 
 use std::fmt::Write;
 
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Shows touch on a tomographic tactile sensor, live, from recordings or simulated.
 #[derive(Debug, Parser)]
@@ -59,8 +59,7 @@ const TASKS: [(&str, &[&str]); 5] = [
 impl Cli {
     /// What was asked for; help and wrong use end the program.
     pub fn read() -> Self {
-        let command = Self::by_task();
-        Self::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit())
+        tactomo_cli::options::read(Self::by_task())
     }
 
     /// The commands, with a help that lists them by task.
@@ -104,6 +103,11 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_option_that_takes_a_number_says_what_is_needed() {
+        assert_eq!(tactomo_cli::options::untold(Cli::by_task()), [""; 0]);
+    }
 
     #[test]
     fn help_lists_every_command_once() {

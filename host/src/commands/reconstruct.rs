@@ -73,9 +73,6 @@ pub struct Args {
     /// Writes a file: one contact a row (.csv), arrays (.npz), or one frame a line (.json, .jsonl)
     #[arg(long, value_name = "FILE", conflicts_with = "json")]
     out: Option<PathBuf>,
-    /// Replaces the file if it exists
-    #[arg(long, requires = "out", visible_alias = "force")]
-    overwrite: bool,
 }
 
 impl Args {
@@ -101,7 +98,7 @@ impl Args {
 /// Solves all frames.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut reader = Reader::open(&args.input())?;
-    let mut writer = Writer::new(args, &reader)?;
+    let mut writer = Writer::new(args)?;
     let (mut times_us, mut changes) = (Vec::new(), Changes::default());
     while let Some(frame) = reader.next_frame()? {
         let begin = Instant::now();

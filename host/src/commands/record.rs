@@ -16,6 +16,7 @@ use super::source::{self, BoardArgs};
 use super::{keep, live};
 use tactomo_cli::choice::DetectorArgs;
 use tactomo_cli::interrupt;
+use tactomo_cli::options;
 use tactomo_cli::output::message;
 
 /// Marks that may wait to be set.
@@ -45,20 +46,20 @@ pub struct Args {
     #[command(flatten)]
     detector: DetectorArgs,
     /// Ends this many seconds after the board said Hello; otherwise with Ctrl-C
-    #[arg(long, value_parser = source::seconds)]
+    #[arg(long, value_parser = options::seconds)]
     seconds: Option<Duration>,
     /// What is worth remembering; the recording carries it
     #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
     notes: String,
     /// Holds this many seconds in memory, and saves them on an event only (at most 256 MB: four minutes of a board on USB at 3000
     /// frames/s)
-    #[arg(long, value_name = "SECONDS", value_parser = source::seconds, requires = "save_on")]
+    #[arg(long, value_name = "SECONDS", value_parser = options::seconds, requires = "save_on")]
     last: Option<Duration>,
     /// What they are saved on: `touch`, when something begins to touch; `enter`, when a line is typed or comes on stdin
     #[arg(long, value_enum, value_name = "EVENT", requires = "last")]
     save_on: Vec<SaveOn>,
     /// How many seconds after the event are saved too; a further event meanwhile lengthens the file [default: 2]
-    #[arg(long, value_name = "SECONDS", value_parser = source::seconds, requires = "last")]
+    #[arg(long, value_name = "SECONDS", value_parser = options::seconds, requires = "last")]
     after: Option<Duration>,
 }
 

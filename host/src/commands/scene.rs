@@ -1,19 +1,23 @@
 //! Arguments that say what touches a simulated detector, and what is wrong with it.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
+use clap::builder::TypedValueParser;
 use tactomo::detector::Detector;
-use tactomo::hertz::{Hertz, Skin, Surface};
+use tactomo::hertz::{self, Hertz, RATIO, Skin, Surface, YOUNG_PA};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
+use tactomo::table::file::Format;
 
 use super::as_built::AsBuiltArgs;
+use tactomo_cli::options;
 use tactomo_cli::output::message;
 
 /// Default seed.
 const SEED: u64 = 1;
+/// A list of touches, some hundred bytes each.
+const TOUCHES: Format = Format::new("a list of touches", 16 << 20);
 
 /// A scene, its hand and faults.
 #[derive(Clone, Debug, clap::Args)]
@@ -24,16 +28,16 @@ pub struct SceneArgs {
     #[arg(long, value_name = "NAME")]
     pub scene: Option<SceneName>,
     /// Force of the scene's firmest press (N) [default: conductances relative to the detector's]
-    #[arg(long, value_name = "NEWTONS", value_parser = positive)]
+    #[arg(long, value_name = "NEWTONS", value_parser = options::force())]
     force: Option<f64>,
     /// Radius of fingertips and bars in the scene (mm) [default: 8, or a seventh of a smaller detector's side]
-    #[arg(long, value_name = "MM", value_parser = positive, requires = "force")]
+    #[arg(long, value_name = "MM", value_parser = options::tip(), requires = "force")]
     tip: Option<f64>,
     /// Young's modulus of the detector, for forces, with the measured surface of such a foam (MPa) [default: that of its foams or of its file]
-    #[arg(long, value_name = "MPA", value_parser = positive)]
+    #[arg(long, value_name = "MPA", value_parser = elasticity())]
     elasticity: Option<f64>,
     /// Poisson's ratio of the detector, for forces [default: that of its file, or 0.3]
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", value_parser = poisson())]
     poisson: Option<f64>,
     /// What the surface conducts under pressure, for forces: measured, a film as the detector's file has it or as in the paper's table II, or ideal, all that touches
     /// alike down to 0.5 mm or to the depth in ideal:MM [default: the file's law, or measured; demonstrations without --force press an ideal one, as the paper gives
@@ -144,7 +148,10 @@ pub fn law(text: &str) -> Result<Law, String> {
     match text.split_once(':') {
         None if text == "measured" => Ok(Law::Measured),
         None if text == "ideal" => Ok(Law::Ideal(Surface::IDEAL)),
-        Some(("ideal", mm)) => positive(mm).map(|mm| Law::Ideal(Surface::Ideal { depth_m: mm * 1e-3 })),
+        Some(("ideal", mm)) => {
+            let depth = options::number_in(mm, "a depth (mm)", &(1e-6..=1e3));
+            depth.map(|mm| Law::Ideal(Surface::Ideal { depth_m: mm * 1e-3 }))
+        }
         _ => Err("measured, ideal, or ideal:MM with a depth in mm is needed".to_owned()),
     }
 }
@@ -173,28 +180,30 @@ impl Press {
 /// A press from `x_mm,y_mm,tip_radius_mm,force_n`, with `z_mm` after `y_mm` on a curved detector.
 pub fn press(text: &str) -> Result<Press, String> {
     let (place_m, [radius_mm, force_n]) = tactomo_cli::choice::place_and(text, "tip_radius_mm,force_n")?;
-    if !(radius_mm > 0.0 && force_n > 0.0 && radius_mm.is_finite() && force_n.is_finite()) {
-        return Err("the tip's radius and the force have to be above zero".to_owned());
-    }
-    Ok(Press { place_m, radius_m: radius_mm * 1e-3, force_n })
+    let press = Press { place_m, radius_m: radius_mm * 1e-3, force_n };
+    hertz::check_press(press.radius_m, force_n).map_err(|error| error.to_string())?;
+    Ok(press)
 }
 
 /// Touches from a JSON file.
 pub fn read_touches(path: &Path) -> anyhow::Result<Vec<Touch>> {
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read the touches {}", path.display()))?;
-    serde_json::from_str(&text).with_context(|| format!("{} is no list of touches", path.display()))
+    let text = TOUCHES.read_text(path).with_context(|| format!("cannot read the touches {}", path.display()))?;
+    let touches: Vec<Touch> =
+        serde_json::from_str(&text).with_context(|| format!("{} is no list of touches", path.display()))?;
+    for (index, touch) in touches.iter().enumerate() {
+        touch.check().with_context(|| format!("{}: touch {index}", path.display()))?;
+    }
+    Ok(touches)
 }
 
-/// A time from zero on (s).
-pub fn time_s(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|number| *number >= 0.0 && number.is_finite());
-    number.ok_or_else(|| "a number of seconds of 0 or above is needed".to_owned())
+/// Parses Poisson's ratio.
+pub fn poisson() -> impl TypedValueParser<Value = f64> {
+    options::number("a ratio", RATIO)
 }
 
-/// A number above zero.
-pub fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
-    number.ok_or_else(|| "a number above 0 is needed".to_owned())
+/// Parses Young's modulus (MPa).
+pub fn elasticity() -> impl TypedValueParser<Value = f64> {
+    options::number("an elasticity (MPa)", 1e-6 * YOUNG_PA.start()..=1e-6 * YOUNG_PA.end())
 }
 
 #[cfg(test)]
@@ -219,8 +228,11 @@ mod tests {
 
     #[test]
     fn wrong_presses_say_what_is_allowed() {
-        for (text, told) in [("1,2,3", "tip_radius_mm,force_n"), ("1,2,0,1", "above zero"), ("1,2,3,inf", "above zero")]
-        {
+        for (text, told) in [
+            ("1,2,3", "tip_radius_mm,force_n"),
+            ("1,2,0,1", "a tip with a radius from 1e-5 m to 1.0 m"),
+            ("1,2,3,inf", "a force from 1e-6 N to 10000.0 N"),
+        ] {
             assert!(press(text).is_err_and(|error| error.contains(told)), "{text}");
         }
     }

@@ -1,9 +1,11 @@
 //! Arguments that choose where the bytes come from.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use clap::ArgGroup;
+use clap::builder::TypedValueParser;
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::record::RecordReader;
 use tactomo::board::session::RequestedSettings;
@@ -15,8 +17,9 @@ use tactomo::simulate::Simulation;
 use tactomo::sink::page::Finger;
 use tactomo_protocol::Settings;
 
-use super::scene::{self, SceneArgs};
+use super::scene::SceneArgs;
 use tactomo_cli::choice::{DetectorArgs, board_model};
+use tactomo_cli::options::{self, number_in};
 
 /// How firmly the mouse presses on the simulated detector, from 0 to 1.
 const MOUSE_FIRMNESS: f64 = 0.3;
@@ -43,7 +46,7 @@ pub struct BoardArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// How many times faster than the simulated board its scene plays and its foam creeps and drifts: a day in 86 seconds with 1000
-    #[arg(long, value_name = "FACTOR", default_value = "1", requires = "simulate", value_parser = scene::positive)]
+    #[arg(long, value_name = "FACTOR", default_value = "1", requires = "simulate", value_parser = factor())]
     pub time_factor: f64,
 }
 
@@ -140,21 +143,20 @@ pub fn recorded_detector(chosen: &DetectorArgs, path: &Path) -> anyhow::Result<D
     chosen.of_recording(path, RecordReader::open(path)?.header())
 }
 
-/// A speed above zero, or `max`.
+/// Factors that time is stretched or shortened by.
+const FACTORS: RangeInclusive<f64> = 1e-3..=1e6;
+
+/// A speed, or `max`.
 pub fn speed(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        _ if text == "max" => Ok(f64::INFINITY),
-        Ok(speed) if speed > 0.0 => Ok(speed),
-        _ => Err("a number above 0, or `max` for as fast as it can be read".to_owned()),
+    match text {
+        "max" => Ok(f64::INFINITY),
+        _ => number_in(text, "`max`, for as fast as it can be read, or a factor", &FACTORS),
     }
 }
 
-/// A time above zero (s).
-pub fn seconds(text: &str) -> Result<std::time::Duration, String> {
-    let seconds = text.parse::<f64>().ok().filter(|seconds| *seconds > 0.0);
-    seconds
-        .and_then(|seconds| std::time::Duration::try_from_secs_f64(seconds).ok())
-        .ok_or_else(|| "a number of seconds above 0".to_owned())
+/// Parses how many times faster something plays.
+fn factor() -> impl TypedValueParser<Value = f64> {
+    options::number("a factor", FACTORS)
 }
 
 /// Base-2 logarithm of a power of two up to 256.
@@ -168,11 +170,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn speeds_times_and_averages_are_checked() {
+    fn speeds_and_averages_are_checked() {
         assert_eq!(speed("2.5"), Ok(2.5));
         assert_eq!(speed("max"), Ok(f64::INFINITY));
-        assert!(speed("0").is_err() && speed("-1").is_err() && speed("NaN").is_err());
-        assert!(seconds("1.5").is_ok() && seconds("0").is_err() && seconds("inf").is_err());
+        for wrong in ["0", "-1", "NaN", "inf", "1e300"] {
+            assert!(speed(wrong).is_err_and(|error| error.contains("from 0.001 to 1000000")), "{wrong}");
+        }
         assert_eq!(average_log2("256"), Ok(8));
         assert!(average_log2("3").is_err() && average_log2("512").is_err() && average_log2("0").is_err());
     }

@@ -19,7 +19,7 @@ use tactomo::sink::place::Place;
 use tactomo::sink::target::{Form, Target};
 use tactomo::solve::{ContactSettings, Problem};
 
-use super::scene;
+use tactomo_cli::options;
 use tactomo_cli::output::message;
 
 /// Where answers go besides the page.
@@ -32,7 +32,7 @@ pub struct StreamArgs {
     #[arg(long, value_name = "FILE|-|tcp:PORT|udp:ADDRESS:PORT")]
     stream: Vec<Target>,
     /// Lines of streams a second at most: the newest answers
-    #[arg(long, value_name = "LINES", requires = "stream", value_parser = scene::positive)]
+    #[arg(long, value_name = "LINES", requires = "stream", value_parser = options::number("a rate (lines a second)", 1e-3..=1e6))]
     stream_hz: Option<f64>,
     /// What lines of streams have: only `contacts`; also what to know of the `answer`; its `image`; the `readings`; or `all`. A list, such
     /// as contacts,image [default: answer]

@@ -8,6 +8,7 @@ use tactomo_touch::pointer::{PointerEvent, PointerState};
 use tactomo_touch::schema::FrameReport;
 use tactomo_touch::solve::Solution;
 
+use super::beneath::Beneath;
 use super::frame::Frame;
 
 /// What an answered frame gave. As JSON it is its [`report`](Self::report).
@@ -33,6 +34,8 @@ pub struct TouchEvent {
     pub is_taking_baseline: bool,
     /// What the solver made of the readings: contacts, shape, image, flags, choice.
     pub solution: Solution,
+    /// Whether something may press that the board cannot read, where nothing was found.
+    pub beneath: Option<Beneath>,
     /// What the pointer has done so far, if a contact is one.
     pub pointer: Option<PointerState>,
     /// What it has done since the event before.
@@ -51,6 +54,7 @@ impl TouchEvent {
             is_revision: false,
             is_taking_baseline: false,
             solution,
+            beneath: None,
             pointer: None,
             pointer_events: Vec::new(),
         }

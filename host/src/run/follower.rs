@@ -5,12 +5,14 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use tactomo_board::identity::Sensor;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{Method, Parts};
 
 use super::Listener;
 use super::answers::Answers;
-use super::calibration::Calibration;
+use super::beneath::{Beneath, BeneathNotice};
+use super::calibration::{Calibration, Meeting};
 use super::event::TouchEvent;
 use super::inbox::{Event, Found, Inbox, Searched, Taken};
 use super::notice::NoticeBoard;
@@ -40,12 +42,13 @@ impl FollowThread {
         let (ours, learning) = (|| Arc::clone(inbox), solving.learning.take());
         let follow = FollowLoop {
             inbox: ours(),
-            wires: WireLooks::new(ours(), Arc::clone(&solving.look_at_wires)),
+            wires: WireLooks::new(ours(), Arc::clone(&notice), Arc::clone(&solving.look_at_wires)),
             solvers: Solvers::new(solving, ours(), Arc::clone(&notice)),
             search: SearchThread::start(ours())?,
             calibration: Calibration::new(ours(), Arc::clone(&notice), folder, learning),
             answers: Answers::new(notice, listeners),
             planner,
+            beneath: BeneathNotice::default(),
             answered: None,
         };
         let thread = thread::Builder::new().name("follower".to_owned());
@@ -73,6 +76,7 @@ struct FollowLoop {
     planner: Planner,
     /// Who is told.
     answers: Answers,
+    beneath: BeneathNotice,
     /// The frame that was answered last, for answers that come after it.
     answered: Option<Arc<TouchEvent>>,
 }
@@ -97,6 +101,7 @@ impl FollowLoop {
                 }
                 Event::Quiet => self.be_quiet(),
                 Event::Board(description) => self.begin_with(description),
+                Event::Sensor(sensor) => self.meet(sensor),
                 Event::Method(method) => self.solvers.change_method(method),
                 Event::Pointer(on) => self.answers.set_pointer(on),
                 Event::Solver(made) => self.change_solver(made)?,
@@ -145,6 +150,18 @@ impl FollowLoop {
         self.planner.restart();
         self.calibration.begin_with(Arc::clone(&description));
         self.solvers.begin_with(description);
+    }
+
+    /// Goes on with what was learned before of the sensor that is connected, and with nothing that was learned of another.
+    fn meet(&mut self, sensor: Sensor) {
+        match self.calibration.meet(sensor) {
+            Meeting::AsBefore => {}
+            Meeting::Known(learned) => self.solvers.use_calibrated(learned),
+            Meeting::Unknown(description) => {
+                self.answered = None;
+                self.solvers.forget_calibrated(description);
+            }
+        }
     }
 
     /// Goes on with the detector that a calibration has found, if it has.
@@ -211,9 +228,14 @@ impl FollowLoop {
         let (method, conversions) = (self.solvers.method(), self.solvers.conversions());
         let Some(detector) = self.solvers.detector() else { return };
         let is_taking_baseline = detector.baseline.state().is_taking();
-        let event = self.answers.tell(TouchEvent { is_taking_baseline, ..event }, begun, came);
+        let beneath = Beneath::of(&detector.detector, &event.frame.used, &event.solution);
+        if let Some(beneath) = self.beneath.take(beneath, event.frame.board_time_us) {
+            tracing::info!("{beneath}");
+        }
+        let event = self.answers.tell(TouchEvent { is_taking_baseline, beneath, ..event }, begun, came);
         let solution = &event.solution;
         detector.watch.answered(solution);
+        self.wires.answered(event.frame.time_s(), solution);
         if !self.wires.is_looking()
             && let Some(look) = detector.watch.look()
         {

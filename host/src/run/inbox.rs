@@ -9,6 +9,7 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use tactomo_board::identity::Sensor;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{AdaptiveMean, Hypothesis, Look, Method, Parts, Solution, Solver};
@@ -62,6 +63,8 @@ impl Taken {
 pub enum Event {
     /// The board has said who it is: the detector, as it measures it.
     Board(Arc<Detector>),
+    /// A board has said Hello on a link that was opened: which sensor it is on.
+    Sensor(Sensor),
     /// Readings are means of so many conversions from now on.
     Conversions(u32),
     /// The baseline is to be taken anew.

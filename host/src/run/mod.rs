@@ -15,6 +15,7 @@
 //! ```
 
 mod answers;
+mod beneath;
 pub mod calibration;
 mod connection;
 pub mod course;
@@ -39,6 +40,7 @@ mod statistics;
 pub mod table;
 mod wires;
 
+pub use self::beneath::Beneath;
 pub use self::event::{Listener, TouchEvent};
 pub use self::found::solution as solution_of_board;
 pub use self::frame::{Arrival, Frame, NewestReadings};
@@ -91,6 +93,8 @@ pub struct Snapshot {
     pub refused: Refusals,
     /// What to know of the baseline, as one sentence for a person; none if all is well.
     pub baseline: Option<String>,
+    /// What to do about wires that may be exchanged, as a sentence for a person; none if nothing speaks for that.
+    pub wires: Option<&'static str>,
     /// What to know of the detector's calibration, as one sentence for a person; none if all is well or there is none.
     pub calibration: Option<String>,
     /// The calibration by rubbing that is under way, if one is.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use tactomo_board::identity;
+use tactomo_board::identity::{self, Sensor};
 use tactomo_board::link::{Control, Link, Playing};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::OtherProtocol;
@@ -160,7 +160,7 @@ impl Reader {
         while let Some(message) = connection.receiver.receive(&mut input) {
             match message {
                 Ok(BoardMessage::Frame(frame)) => self.frame(connection, &frame, received),
-                Ok(BoardMessage::Hello(hello)) => self.hello(connection, hello, received)?,
+                Ok(BoardMessage::Hello(hello)) => self.hello(connection, link, hello, received)?,
                 Ok(BoardMessage::Contacts(contacts)) => self.contacts(connection, contacts, received),
                 Ok(BoardMessage::Table(_)) => {}
                 Ok(BoardMessage::Clock(clock)) => connection.session.clock(clock, received),
@@ -195,12 +195,19 @@ impl Reader {
         }
     }
 
-    fn hello(&mut self, connection: &mut Connection, hello: Hello, now: Instant) -> Result<(), LiveError> {
+    fn hello(
+        &mut self,
+        connection: &mut Connection,
+        link: &dyn Link,
+        hello: Hello,
+        now: Instant,
+    ) -> Result<(), LiveError> {
         connection.session.hello(&hello, now);
         if connection.answers && !connection.session.knows_the_board() {
             return Ok(());
         }
         self.recordings.hello(&hello);
+        let sensor = (self.follows && connection.junk.is_none()).then(|| Sensor::on(link, &hello));
         connection.junk.get_or_insert(connection.receiver.counters().corrupt);
         self.greeted.get_or_insert(now);
         self.missed = None;
@@ -231,6 +238,8 @@ impl Reader {
             self.board =
                 Some(Board { volts: Volts::of(&hello).above(measured.ground_v), hello, detector: measured, noise_v });
         }
+        // After the detector, of which something may have been learned.
+        sensor.into_iter().for_each(|sensor| self.inbox.put(Event::Sensor(sensor)));
         Ok(())
     }
 

@@ -69,6 +69,13 @@ impl Solvers {
         self.order_again();
     }
 
+    /// Goes on with the detector as it is described: what was found is of another sensor.
+    pub fn forget_calibrated(&mut self, description: Arc<Detector>) {
+        self.calibrated = None;
+        self.notice.change(|snapshot| (snapshot.calibrated, snapshot.calibration) = (None, None));
+        self.begin_with(description);
+    }
+
     /// Readings are means of so many conversions from now on.
     pub fn set_conversions(&mut self, conversions: u32) {
         self.conversions = conversions;

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
+use tactomo_board::identity::Sensor;
 use tactomo_board::link::Link;
 use tactomo_board::measured::{self, Mismatch};
 use tactomo_board::session::{self, GreetError};
@@ -12,10 +13,14 @@ use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Detector, ForceLaw};
 use tactomo_physics::forward::ForwardError;
 use tactomo_protocol::{Hello, TableId};
-use tactomo_touch::solve::{self, CompileError, FoundContact, Problem, compile};
+use tactomo_touch::solve::{self, CompileError, CompiledTable, FoundContact, Problem, compile};
+
+use super::calibration::Learning;
 
 /// How long a board has to say Hello.
 const PATIENCE: Duration = Duration::from_secs(6);
+/// A table's drive may be above the board's by so much (V), as boards allow: theirs are told in whole millivolts.
+const SAME_DRIVE_V: f64 = 1e-3;
 
 /// A board that was given no table.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +44,22 @@ pub enum GiveTableError {
     /// The detector has no table.
     #[error(transparent)]
     Compile(#[from] CompileError),
+    /// The table of a file is of another detector.
+    #[error(
+        "{link}: the table is of {} electrodes and a drive of {:.3} V, and the board has {electrodes} electrodes and a drive of {drive_v:.3} V. \
+         Compile the detector that is connected",
+        table.electrodes, table.drive_v
+    )]
+    OtherDetector {
+        /// Name of the link.
+        link: String,
+        /// The table.
+        table: Box<CompiledTable>,
+        /// Electrodes of the board.
+        electrodes: usize,
+        /// Its drive (V).
+        drive_v: f64,
+    },
     /// The table was not taken.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -63,11 +84,26 @@ pub struct Given {
 /// [`GiveTableError`] if there is none, or the board does not take it.
 pub fn give(link: &mut dyn Link, what: &What, mut progress: impl FnMut(usize, usize)) -> Result<Given, GiveTableError> {
     let name = link.name();
-    let hello =
-        session::greet(link, Instant::now() + PATIENCE).map_err(|error| GiveTableError::Greet { link: name, error })?;
+    let hello = session::greet(link, Instant::now() + PATIENCE)
+        .map_err(|error| GiveTableError::Greet { link: name.clone(), error })?;
     let bytes = match what {
-        What::Table(bytes) => bytes.clone(),
-        What::Detector(detector) => compile(&Problem::of(&measured::as_measured(detector, &hello)?)?)?,
+        What::Table(table) => {
+            let (electrodes, drive_v) = (hello.electrodes.into(), f64::from(hello.drive_mv) * 1e-3);
+            // A ground that is lifted takes some of the board's drive.
+            if table.electrodes != electrodes || table.drive_v > drive_v + SAME_DRIVE_V {
+                let table = Box::new(table.clone());
+                return Err(GiveTableError::OtherDetector { link: name, table, electrodes, drive_v });
+            }
+            table.bytes().to_vec()
+        }
+        What::Detector(detector) => compiled(detector, &hello)?,
+        What::Learned(learning) => {
+            let (kept, refused) = learning.kept(&Sensor::on(link, &hello));
+            refused.iter().for_each(|why| tracing::warn!("{why}"));
+            kept.iter()
+                .for_each(|kept| tracing::info!("the table is of what was learned before: {}", kept.file.display()));
+            compiled(kept.as_ref().map_or(&learning.description, |kept| &kept.detector), &hello)?
+        }
     };
     let mut is_sent = false;
     let table = table::send(link, &bytes, |at| {
@@ -77,13 +113,20 @@ pub fn give(link: &mut dyn Link, what: &What, mut progress: impl FnMut(usize, us
     Ok(Given { hello, bytes, table, is_sent })
 }
 
+/// The table of a detector as a board measures it.
+fn compiled(detector: &Detector, board: &Hello) -> Result<Vec<u8>, GiveTableError> {
+    Ok(compile(&Problem::of(&measured::as_measured(detector, board)?)?)?)
+}
+
 /// What a board is to find contacts by.
 #[derive(Clone, Debug)]
 pub enum What {
     /// A detector, as the board measures it.
     Detector(Box<Detector>),
+    /// What was learned before of the detector on this board, or else its description.
+    Learned(Box<Learning>),
     /// A table that was compiled before.
-    Table(Vec<u8>),
+    Table(CompiledTable),
 }
 
 /// The table that a board was given last, for those who read what it finds.
@@ -130,9 +173,9 @@ pub struct WithTable {
 }
 
 impl WithTable {
-    /// A board on `source` that finds contacts on a detector; its table is put in `table`.
-    pub fn new(source: Box<dyn Source>, detector: Detector, table: BoardTable) -> Self {
-        Self { source, what: What::Detector(Box::new(detector)), table }
+    /// A board on `source` that finds contacts by `what`; its table is put in `table`.
+    pub fn new(source: Box<dyn Source>, what: What, table: BoardTable) -> Self {
+        Self { source, what, table }
     }
 }
 

@@ -5,10 +5,11 @@ pub mod ros2;
 mod writer;
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
+
+use tactomo_physics::new_file::{self, NewFileError};
 
 use self::writer::{Schema, Writer};
 use super::channels::{Messages, Topic, Topics};
@@ -112,9 +113,8 @@ impl Sinks {
         detectors: Vec<Messages>,
         about: BTreeMap<String, String>,
     ) -> Result<(), StreamError> {
-        let failed = |source| StreamError::Mcap { path: PathBuf::from(path), source };
-        let file = File::create_new(path).map_err(failed)?;
-        let file = McapFile::new(BufWriter::new(file), detectors, about).map_err(failed)?;
+        let file = BufWriter::new(new_file::create(path)?);
+        let file = McapFile::new(file, detectors, about).map_err(|source| NewFileError::of(path, source))?;
         let name = format!("{}", path.display());
         self.run(name.clone(), (Keeps::All, None), DISK_PATIENCE, file).map_err(StreamError::thread(&name))
     }

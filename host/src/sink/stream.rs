@@ -1,9 +1,9 @@
 //! Streams of JSON Lines: to a file, to stdout, to whoever connects, or in datagrams.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
 use std::time::{Duration, Instant};
+
+use tactomo_physics::new_file;
 
 use super::door::Limits;
 use super::feed::{Delivery, Keeps};
@@ -14,6 +14,7 @@ use super::{tcp, udp};
 
 /// Longest that a line waits in the buffer of a file.
 const FLUSH_EVERY: Duration = Duration::from_millis(20);
+
 impl Sinks {
     /// Adds a stream; one that listens says where, since it may have been given any port.
     ///
@@ -28,7 +29,7 @@ impl Sinks {
                 self.run(name.clone(), pace(Keeps::Newest), PATIENCE, lines)
             }
             Target::File(path) => {
-                let lines = Lines::new(create(path)?, form.fields, FLUSH_EVERY);
+                let lines = Lines::new(new_file::create(path)?, form.fields, FLUSH_EVERY);
                 self.run(name.clone(), pace(Keeps::All), DISK_PATIENCE, lines)
             }
             Target::Tcp(address) => return tcp::serve(self, address, form, Limits::default()).map(Some),
@@ -39,10 +40,6 @@ impl Sinks {
         };
         started.map(|()| None).map_err(StreamError::thread(&name))
     }
-}
-
-fn create(path: &Path) -> Result<File, StreamError> {
-    File::create_new(path).map_err(|source| StreamError::Create { path: path.to_owned(), source })
 }
 
 /// Lines to whatever bytes are written to.
@@ -139,7 +136,7 @@ mod tests {
         let path = std::env::temp_dir().join(format!("tactomo-{}-stream.jsonl", std::process::id()));
         std::fs::write(&path, "kept").unwrap();
         let refused = Sinks::default().add_stream(&Target::File(path.clone()), Form::default()).unwrap_err();
-        assert!(refused.to_string().contains("has to be a new file"), "{refused}");
+        assert!(refused.to_string().contains("exists already, and no file is replaced"), "{refused}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "kept");
         std::fs::remove_file(&path).unwrap();
     }

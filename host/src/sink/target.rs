@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
+use tactomo_physics::new_file::NewFileError;
+
 use super::address::Address;
 use super::lines::Fields;
 
@@ -63,22 +65,9 @@ pub struct Form {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StreamError {
-    /// The file cannot be made, or is there already.
-    #[error("cannot write the stream {path} (it has to be a new file, or `-` for stdout)")]
-    Create {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The same of an MCAP file.
-    #[error("cannot write {path} (an MCAP file has to be a new one)")]
-    Mcap {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
+    /// The file of a stream cannot be made.
+    #[error(transparent)]
+    File(#[from] NewFileError),
     /// Another program listens there.
     #[error("port {address} for {what} is busy: give it another port, or end the program that listens there")]
     Busy {

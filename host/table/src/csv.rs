@@ -6,7 +6,7 @@
 
 use std::io::{self, Write};
 
-use ::csv::{ReaderBuilder, StringRecord, Trim};
+use ::csv::{ErrorKind, ReaderBuilder, StringRecord, Trim};
 
 use super::Array;
 
@@ -223,14 +223,21 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// If it cannot be written, or is not as long as the rows before it.
     pub fn row<C: AsRef<[u8]>>(&mut self, cells: impl IntoIterator<Item = C>) -> io::Result<()> {
-        self.writer.write_record(cells).map_err(io::Error::from)
+        self.writer.write_record(cells).map_err(|error| {
+            let told = error.to_string();
+            match error.into_kind() {
+                // As the system says it: its kind tells what to do.
+                ErrorKind::Io(error) => error,
+                _ => io::Error::other(told),
+            }
+        })
     }
 
-    /// Ends it.
+    /// Writes what waits in memory.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(mut self) -> io::Result<()> {
+    pub fn flush(&mut self) -> io::Result<()> {
         self.writer.flush()
     }
 }
@@ -319,7 +326,8 @@ mod tests {
         let mut writer = CsvWriter::new(&mut bytes);
         writer.row(["a", "b"]).unwrap();
         writer.row(["1", "two, or \"three\""]).unwrap();
-        writer.finish().unwrap();
+        writer.flush().unwrap();
+        drop(writer);
         assert_eq!(bytes, b"a,b\n1,\"two, or \"\"three\"\"\"\n");
         let mut writer = CsvWriter::new(Vec::new());
         writer.row(["a", "b"]).unwrap();
@@ -336,7 +344,8 @@ mod tests {
             for row in values[..whole].chunks(columns) {
                 writer.row(row.iter().map(f64::to_string)).unwrap();
             }
-            writer.finish().unwrap();
+            writer.flush().unwrap();
+            drop(writer);
             let (names, rows) = parse(str::from_utf8(&bytes).unwrap()).unwrap();
             prop_assert!(names.is_empty());
             prop_assert_eq!(&rows.values[..], &values[..whole]);

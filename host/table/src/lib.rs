@@ -1,22 +1,27 @@
 //! Numbers in files of others: CSV, NPY and NPZ, recognised by what is in them. None of it is trusted.
+//!
+//! [`mod@file`] bounds what is read of any file that is read whole.
 
 mod channels;
 mod csv;
+pub mod file;
 mod kinds;
 mod npy;
 mod npz;
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 pub use self::channels::{Channels, channels};
 pub use self::csv::CsvWriter;
+use self::file::Format;
 pub use self::npy::Values;
 pub use self::npz::NpzWriter;
 
-/// Longest file that is read (bytes).
+/// Longest table that is read, in its file and unpacked (bytes).
 const LONGEST: u64 = 1 << 28;
+/// Tables are read whole.
+const FORMAT: Format = Format::new("a table", LONGEST);
 
 /// Numbers of some shape, the last axis running fastest.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,12 +64,6 @@ pub enum TableError {
         path: PathBuf,
         /// What the system says.
         source: io::Error,
-    },
-    /// It is longer than anything that belongs here.
-    #[error("{path} is longer than {} MB: cut it into pieces", LONGEST >> 20)]
-    Long {
-        /// The file.
-        path: PathBuf,
     },
     /// It is not what it seems.
     #[error("{path}: {what}")]
@@ -144,13 +143,7 @@ impl Table {
 
 /// All bytes of a file that is not too long.
 fn bytes_of(path: &Path) -> Result<Vec<u8>, TableError> {
-    let read = |source| TableError::Read { path: path.to_owned(), source };
-    let mut bytes = Vec::new();
-    File::open(path).map_err(read)?.take(LONGEST + 1).read_to_end(&mut bytes).map_err(read)?;
-    if bytes.len() as u64 > LONGEST {
-        return Err(TableError::Long { path: path.to_owned() });
-    }
-    Ok(bytes)
+    FORMAT.read(path).map_err(|source| TableError::Read { path: path.to_owned(), source })
 }
 
 /// Names of arrays, for messages.

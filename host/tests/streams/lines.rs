@@ -85,8 +85,8 @@ fn ports_that_are_busy_and_files_that_exist_are_said_before_anything_begins() {
         (["--foxglove", &port], "is busy"),
         (["--stream", "tcp:192.0.2.1:9000"], "192.0.2.1:9000"),
         (["--stream", "udp:no-such-host.invalid:9000"], "no-such-host.invalid:9000"),
-        (["--stream", there], "has to be a new file"),
-        (["--mcap", there], "has to be a new one"),
+        (["--stream", there], "exists already, and no file is replaced"),
+        (["--mcap", there], "exists already, and no file is replaced"),
     ] {
         let output = tactomo(&["live", "--simulate", "--seconds", "1", "--json"]).args(args).output().unwrap();
         let error = String::from_utf8(output.stderr).unwrap();
@@ -103,7 +103,7 @@ fn wrong_streams_are_wrong_use() {
         (&["--stream", "tcp:nine"][..], "127.0.0.1:9000"),
         (&["--stream", "-", "--stream-fields", "forces"], "`forces`"),
         (&["--stream-hz", "10"], "--stream"),
-        (&["--stream", "-", "--stream-hz", "0"], "above 0"),
+        (&["--stream", "-", "--stream-hz", "0"], "a rate (lines a second) from 0.001 to 1000000"),
     ] {
         let output = tactomo(&["live", "--simulate"]).args(args).output().unwrap();
         let error = String::from_utf8(output.stderr).unwrap();

@@ -169,63 +169,71 @@ impl<'a> FrameReport<'a> {
         }
     }
 
-    fn flag(&self, of: fn(&Flags) -> bool) -> Option<f64> {
-        self.flags.map(|flags| f64::from(u8::from(of(flags))))
+    fn flag(&self, of: fn(&Flags) -> bool) -> Option<bool> {
+        self.flags.map(of)
     }
 }
 
-/// A number of a frame, by its name.
+/// A figure of a frame, by its name.
 pub struct FrameColumn {
     /// Name with unit.
     pub name: &'static str,
-    /// What kind of number it is.
-    pub kind: Kind,
-    of: fn(&FrameReport) -> Option<f64>,
+    /// What it is.
+    pub of: Of,
 }
 
-/// The numbers of a frame but for its contacts and image, in the order of every format.
+/// What a figure of a frame is, in its own kind: a number of nanoseconds since 1970 has more digits than a float. `None` where it is not known.
+#[derive(Clone, Copy)]
+pub enum Of {
+    /// A whole number.
+    Integer(fn(&FrameReport) -> Option<u64>),
+    /// Whether something is so.
+    Flag(fn(&FrameReport) -> Option<bool>),
+    /// Any number.
+    Number(fn(&FrameReport) -> Option<f64>),
+}
+
+/// The figures of a frame but for its contacts and image, in the order of every format.
 pub const FRAME_COLUMNS: [FrameColumn; 19] = [
-    FrameColumn { name: "frame", kind: Kind::Integer, of: |frame| frame.frame.map(|frame| frame as f64) },
-    FrameColumn { name: "sequence", kind: Kind::Integer, of: |frame| frame.sequence.map(|sequence| sequence as f64) },
-    FrameColumn { name: "time_s", kind: Kind::Number, of: |frame| frame.time_s },
-    FrameColumn { name: "arrived_unix_s", kind: Kind::Number, of: |frame| frame.arrived_unix_s },
-    FrameColumn { name: "host_time_ns", kind: Kind::Integer, of: |frame| frame.host_time_ns.map(|time| time as f64) },
-    FrameColumn {
-        name: "host_time_error_ns",
-        kind: Kind::Integer,
-        of: |frame| frame.host_time_error_ns.map(|error| error as f64),
-    },
-    FrameColumn { name: "lost_before", kind: Kind::Integer, of: |frame| frame.lost_before.map(|count| count as f64) },
-    FrameColumn { name: "rezeroing", kind: Kind::Flag, of: |frame| Some(f64::from(frame.rezeroing)) },
-    FrameColumn { name: "frame_us", kind: Kind::Number, of: |frame| frame.frame_us },
-    FrameColumn { name: "age_us", kind: Kind::Number, of: |frame| frame.age_us },
-    FrameColumn { name: "residual", kind: Kind::Number, of: |frame| frame.residual },
-    FrameColumn { name: "certainty", kind: Kind::Number, of: |frame| frame.certainty },
+    FrameColumn { name: "frame", of: Of::Integer(|frame| frame.frame) },
+    FrameColumn { name: "sequence", of: Of::Integer(|frame| frame.sequence) },
+    FrameColumn { name: "time_s", of: Of::Number(|frame| frame.time_s) },
+    FrameColumn { name: "arrived_unix_s", of: Of::Number(|frame| frame.arrived_unix_s) },
+    FrameColumn { name: "host_time_ns", of: Of::Integer(|frame| frame.host_time_ns) },
+    FrameColumn { name: "host_time_error_ns", of: Of::Integer(|frame| frame.host_time_error_ns) },
+    FrameColumn { name: "lost_before", of: Of::Integer(|frame| frame.lost_before) },
+    FrameColumn { name: "rezeroing", of: Of::Flag(|frame| Some(frame.rezeroing)) },
+    FrameColumn { name: "frame_us", of: Of::Number(|frame| frame.frame_us) },
+    FrameColumn { name: "age_us", of: Of::Number(|frame| frame.age_us) },
+    FrameColumn { name: "residual", of: Of::Number(|frame| frame.residual) },
+    FrameColumn { name: "certainty", of: Of::Number(|frame| frame.certainty) },
     FrameColumn {
         name: "alternative_contacts",
-        kind: Kind::Integer,
-        of: |frame| frame.alternative.map(|other| other.contacts as f64),
+        of: Of::Integer(|frame| frame.alternative.map(|other| other.contacts as u64)),
     },
     FrameColumn {
         name: "alternative_certainty",
-        kind: Kind::Number,
-        of: |frame| frame.alternative.map(|other| other.certainty),
+        of: Of::Number(|frame| frame.alternative.map(|other| other.certainty)),
     },
-    FrameColumn { name: "saturated", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.saturated) },
-    FrameColumn { name: "misfit", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.misfit) },
-    FrameColumn { name: "unfinished", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.unfinished) },
-    FrameColumn { name: "calibrate", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.calibrate) },
+    FrameColumn { name: "saturated", of: Of::Flag(|frame| frame.flag(|flags| flags.saturated)) },
+    FrameColumn { name: "misfit", of: Of::Flag(|frame| frame.flag(|flags| flags.misfit)) },
+    FrameColumn { name: "unfinished", of: Of::Flag(|frame| frame.flag(|flags| flags.unfinished)) },
+    FrameColumn { name: "calibrate", of: Of::Flag(|frame| frame.flag(|flags| flags.calibrate)) },
     FrameColumn {
         name: "excluded_count",
-        kind: Kind::Integer,
-        of: |frame| frame.flags.map(|flags| flags.excluded.len() as f64),
+        of: Of::Integer(|frame| frame.flags.map(|flags| flags.excluded.len() as u64)),
     },
 ];
 
 impl FrameColumn {
-    /// Its value, if it is known.
-    pub fn value(&self, frame: &FrameReport) -> Option<f64> {
-        (self.of)(frame)
+    /// Its value as text; nothing if it is not known.
+    fn text(&self, frame: &FrameReport) -> String {
+        let text = match self.of {
+            Of::Integer(of) => of(frame).map(|value| value.to_string()),
+            Of::Flag(of) => of(frame).map(|value| value.to_string()),
+            Of::Number(of) => of(frame).map(|value| value.to_string()),
+        };
+        text.unwrap_or_default()
     }
 }
 
@@ -378,12 +386,18 @@ mod tests {
         assert_eq!(json["total"], total);
         assert!(["image_s_per_m2", "frame", "shape", "events"].iter().all(|name| json.get(name).is_none()));
         let events = [PointerEvent::Press, PointerEvent::Move { dx_m: 0.5, dy_m: -0.25 }];
-        let report = FrameReport { events: &events, arrived_unix_s: Some(1.79e9), ..FrameReport::of(&solution) };
+        let report = FrameReport {
+            events: &events,
+            arrived_unix_s: Some(1.79e9),
+            host_time_ns: Some(1_795_356_721_248_139_205),
+            ..FrameReport::of(&solution)
+        };
         let rows = csv_rows(&report);
         let gestures = r#"[{"kind":"press"},{"kind":"move","dx_m":0.5,"dy_m":-0.25}]"#;
         assert_eq!(rows[1][csv_heads().len() - 3..], ["3 14", "2 contacts", gestures]);
         let at = |name: &str| csv_heads().iter().position(|head| *head == name).unwrap();
         assert_eq!([&rows[1][at("arrived_unix_s")], &rows[1][at("misfit")]], ["1790000000", "true"]);
+        assert_eq!(rows[1][at("host_time_ns")], "1795356721248139205", "no float has so many digits");
         let values = |event: &PointerEvent| EVENT_COLUMNS.each_ref().map(|column| column.value(event));
         assert_eq!(values(&events[0]), [Some(1.0), None, None, None, None, None]);
         assert_eq!(values(&events[1]), [Some(0.0), Some(0.5), Some(-0.25), None, None, None]);

@@ -79,7 +79,7 @@ impl Limit {
             place_m: bounds.as_deref().map(rms_m),
             worst_place_m: bounds
                 .as_ref()
-                .map(|bounds| bounds.iter().map(|bound| bound.position_any_radius_m).fold(0.0, f64::max)),
+                .map(|bounds| bounds.iter().map(|bound| bound.position_m).fold(0.0, f64::max)),
             conductance: bounds.as_ref().map(|bounds| bounds[4].conductance),
             two_points_m: two_points_m(model, press, strength, &errors)?,
             range: range(model, press, strengths, &errors)?,
@@ -103,7 +103,7 @@ fn at_nine_places(
 
 /// Root mean square of their standard errors (m).
 fn rms_m(bounds: &[Bound]) -> f64 {
-    (bounds.iter().map(|bound| bound.position_any_radius_m.powi(2)).sum::<f64>() / bounds.len() as f64).sqrt()
+    (bounds.iter().map(|bound| bound.position_m.powi(2)).sum::<f64>() / bounds.len() as f64).sqrt()
 }
 
 /// [`Limit::place_m`] alone.
@@ -128,7 +128,7 @@ pub struct Spread {
 impl Spread {
     /// Of bounds at some places, those that are not told among them; `None` if that is half of them.
     fn of(bounds: &[Option<Bound>]) -> Option<Self> {
-        let errors_m = bounds.iter().map(|bound| bound.map_or(f64::INFINITY, |bound| bound.position_any_radius_m));
+        let errors_m = bounds.iter().map(|bound| bound.map_or(f64::INFINITY, |bound| bound.position_m));
         let mut errors_m: Vec<f64> = errors_m.collect();
         errors_m.sort_by(f64::total_cmp);
         let last = errors_m.len().checked_sub(1)? as f64;
@@ -147,10 +147,10 @@ impl Spread {
 
 /// Error (m) that half of presses have less than, each at one of some places; `None` if half of the places are not told.
 fn median_error_m(bounds: &[Option<Bound>]) -> Option<f64> {
-    let told = || bounds.iter().flatten().filter(|bound| bound.axes_any_radius_m[0].is_finite());
-    let largest_m = told().map(|bound| bound.axes_any_radius_m[0]).fold(0.0, f64::max);
+    let told = || bounds.iter().flatten().filter(|bound| bound.axes_m[0].is_finite());
+    let largest_m = told().map(|bound| bound.axes_m[0]).fold(0.0, f64::max);
     let is_median = |error_m: f64| {
-        let share: f64 = told().map(|bound| share_within(error_m, bound.axes_any_radius_m)).sum();
+        let share: f64 = told().map(|bound| share_within(error_m, bound.axes_m)).sum();
         Ok(share >= 0.5 * bounds.len() as f64)
     };
     // Of five decades, to one in ten thousand.
@@ -214,7 +214,7 @@ pub fn two_points_m(
         });
         let bounds = cramer_rao(model, &pair, errors)?.unwrap_or_default();
         // Both coordinates of a place; along the line between them it is at most that.
-        let error_m = bounds.iter().map(|bound| bound.position_any_radius_m).fold(f64::NAN, f64::max);
+        let error_m = bounds.iter().map(|bound| bound.position_m).fold(f64::NAN, f64::max);
         Ok::<_, ForwardError>(distance_m >= APART_DEVIATIONS * error_m)
     };
     let [low_m, high_m] = DISTANCES.map(|share| share * side_m);
@@ -393,13 +393,13 @@ mod tests {
 
     /// Bounds of such standard errors, as large in all directions.
     fn round(errors_m: &[f64]) -> Vec<Option<Bound>> {
-        let of = |error_m: &f64| Bound { position_any_radius_m: *error_m, ..ellipse([error_m / 2f64.sqrt(); 2]) };
+        let of = |error_m: &f64| Bound { position_m: *error_m, ..ellipse([error_m / 2f64.sqrt(); 2]) };
         errors_m.iter().map(|error_m| Some(of(error_m))).collect()
     }
 
     fn ellipse(axes_m: [f64; 2]) -> Bound {
         let position_m = axes_m[0].hypot(axes_m[1]);
-        Bound { axes_any_radius_m: axes_m, position_any_radius_m: position_m, position_m, ..Bound::default() }
+        Bound { axes_m, position_m, ..Bound::default() }
     }
 
     /// In a plane half of normal errors are within `sqrt(2 ln 2)` deviations, along a line within 0.6745.

@@ -37,6 +37,11 @@ pub fn chance(pairs: &[[f64; 2]]) -> Option<f64> {
     Some(f64::from(as_strong + 1) / f64::from(SHUFFLES + 1))
 }
 
+/// A probability in words: random orders give none below the thousandth that they can tell.
+pub fn p_text(chance: f64) -> String {
+    if chance < 1e-3 { "p < 0.001".to_owned() } else { format!("p = {chance:.3}") }
+}
+
 /// Which of a family of tests, by their probabilities under chance alone, hold so that one false one among all is less likely than `level`: Holm, "A simple
 /// sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 6 (1979). A test that could not be made takes part, and fails.
 pub fn holm(chances: &[Option<f64>], level: f64) -> Vec<bool> {
@@ -103,6 +108,11 @@ mod tests {
         assert_eq!(holm(&[Some(0.02), Some(0.02), Some(0.02)], 0.05), [false; 3]);
         assert_eq!(holm(&[Some(0.04)], 0.05), [true]);
         assert_eq!(holm(&[], 0.05), [] as [bool; 0]);
+    }
+
+    #[test]
+    fn no_probability_is_printed_as_zero() {
+        assert_eq!([4e-4, 1e-3, 0.0384].map(p_text), ["p < 0.001", "p = 0.001", "p = 0.038"]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::{Contact, Touch};
+use tactomo_study::judge::answered;
 use tactomo_study::{Experiment, StudyError};
 use tactomo_touch::metrics::Matching;
 use tactomo_touch::solve::{Method, Solver};
@@ -74,7 +75,7 @@ impl AsBuilt {
             let solution = solver
                 .solve(&frame.readings)
                 .map_err(|error| StudyError::Solve { solver: solver.name().to_owned(), error })?;
-            let found = if solution.is_contacts() { &solution.contacts[..] } else { &[] };
+            let found = answered(&solution);
             let matching = Matching::within(f64::INFINITY, contacts, found);
             self.errors_m.extend(matching.pairs.iter().map(|pair| pair.distance_m));
             self.errors_m.extend(matching.missed.iter().map(|_| f64::INFINITY));
@@ -123,8 +124,8 @@ impl Presses {
             let solution = solver
                 .solve(&frame.readings)
                 .map_err(|error| StudyError::Solve { solver: solver.name().to_owned(), error })?;
-            if solution.is_contacts() && solution.contacts.len() == 1 {
-                let matching = Matching::within(f64::INFINITY, &[*contact], &solution.contacts);
+            if let found @ [_] = answered(&solution) {
+                let matching = Matching::within(f64::INFINITY, &[*contact], found);
                 self.squares_m2.extend(matching.pairs.iter().map(|pair| pair.distance_m.powi(2)));
             }
         }

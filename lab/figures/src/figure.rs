@@ -54,7 +54,7 @@ impl Figure {
         let found = find(report, &self.path);
         let numbers: Option<Vec<f64>> = found.iter().map(|value| value.as_f64()).collect();
         let number = match (self.fold, numbers.as_deref(), &found[..]) {
-            (Fold::One, _, [Value::String(word)]) => return Ok(Value::String(said(word))),
+            (Fold::One, _, [Value::String(word)]) => return Ok(Value::String(word.clone())),
             (Fold::One, Some([number]), _) => *number,
             (Fold::Largest, Some(numbers @ [_, ..]), _) => numbers.iter().copied().fold(f64::MIN, f64::max),
             _ => bail!("{}: `{}` leads to {} values in the report of {}", self.id, self.path, found.len(), self.job),
@@ -68,18 +68,6 @@ impl Figure {
             Spread::By(most) => most,
             Spread::Share(share) => share * value.as_f64().unwrap_or_default().abs(),
         }
-    }
-}
-
-/// What documents say for a word of a report.
-fn said(word: &str) -> String {
-    match word {
-        "paper-only" => "only as the paper computes it".to_owned(),
-        "sensor-only" => "for the sensor only".to_owned(),
-        "sensor-holds" => "for the sensor; else cannot be judged".to_owned(),
-        "sensor-does-not" => "not for the sensor; else cannot be judged".to_owned(),
-        "unknown" => "cannot be judged".to_owned(),
-        word => word.replace('-', " "),
     }
 }
 
@@ -118,7 +106,7 @@ mod tests {
 
     #[test]
     fn values_are_scaled_and_folded_and_never_guessed() {
-        let report = json!({"a": [{"x": 0.0012345678}, {"x": 0.002}], "word": "does-not-hold"});
+        let report = json!({"a": [{"x": 0.0012345678}, {"x": 0.002}], "word": "does not hold"});
         assert_eq!(figure("a/0/x", Fold::One).of(&report).unwrap(), json!(1.23457));
         assert_eq!(figure("a/*/x", Fold::Largest).of(&report).unwrap(), json!(2.0));
         assert_eq!(figure("word", Fold::One).of(&report).unwrap(), json!("does not hold"));

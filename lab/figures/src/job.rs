@@ -80,7 +80,7 @@ pub const JOBS: &[Job] = &[
     job("surface", "tactomo-lab study surface --seed 1"),
     slow("thickness", "tactomo-lab study thickness"),
     slow("scan", "tactomo-lab tradeoff --scan --places 6 --seed 21"),
-    of_machine("tradeoff", "tactomo-lab tradeoff --quick --seed 1"),
+    of_machine("tradeoff", "tactomo-lab tradeoff --quick --places 10 --seed 1"),
     of_machine("live-ideal", "tactomo live --simulate --board ideal --scene single --seconds 5 --no-open"),
     of_machine("live-esp32", "tactomo live --simulate --board esp32 --scene single --seconds 5 --no-open"),
     of_machine("live-esp32-firm", "tactomo live --simulate --board esp32 --scene five-fingers --seconds 5 --no-open"),

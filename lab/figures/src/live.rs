@@ -74,6 +74,8 @@ async fn settled(browser: &Browser, live: &Live) -> Result<()> {
         browser.client.find(Locator::Id("theme")).await?.click().await?;
     }
     tokio::time::sleep(SETTLES).await;
+    // Scenes press from the start on, which the page has to say, and a person has read by now.
+    browser.client.execute("document.getElementById('notice-close').click()", Vec::new()).await?;
     Ok(())
 }
 

@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_parser = threshold)]
     threshold: Vec<&'static Threshold>,
     /// What it is multiplied by; give it again for more
-    #[arg(long, default_values_t = [0.5, 2.0])]
+    #[arg(long, default_values_t = [0.5, 2.0], value_parser = tactomo_cli::options::number("a factor", 0.0..=1e6))]
     factor: Vec<f64>,
     /// Random scenes that are found cold
     #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u32).range(5..=1_000_000))]

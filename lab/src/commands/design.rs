@@ -14,6 +14,7 @@ use tactomo_study::view::{self, View};
 
 use super::shown::watched;
 use tactomo_cli::choice::board_model;
+use tactomo_cli::options;
 use tactomo_cli::output::{self, NewFile, message};
 
 /// Finds the detector that meets what you want: foams, thicknesses and electrodes.
@@ -34,19 +35,19 @@ pub struct Args {
     #[arg(long, value_name = "WxH", default_value = "60x60")]
     size: Size,
     /// Smallest force that has to be seen, N
-    #[arg(long, value_name = "N", default_value_t = 0.05)]
+    #[arg(long, value_name = "N", default_value_t = 0.05, value_parser = options::force())]
     smallest: f64,
     /// Largest force that must not saturate it, N
-    #[arg(long, value_name = "N", default_value_t = 2.5)]
+    #[arg(long, value_name = "N", default_value_t = 2.5, value_parser = options::force())]
     largest: f64,
     /// Error of a place, mm: of one frame of a press in the middle of these forces
-    #[arg(long, value_name = "MM", default_value_t = 0.5)]
+    #[arg(long, value_name = "MM", default_value_t = 0.5, value_parser = options::tip())]
     place: f64,
     /// Distance of two such presses that have to be told apart, mm [default: a sixth of the shorter side]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = options::tip())]
     two_points: Option<f64>,
     /// Frames a second
-    #[arg(long, value_name = "NUMBER", default_value_t = 100.0)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 100.0, value_parser = options::number("a rate (frames a second)", 1e-3..=1e6))]
     frames: f64,
     /// Electrodes at most: the channels of the board
     #[arg(long, value_name = "COUNT", default_value_t = 16)]
@@ -58,7 +59,7 @@ pub struct Args {
     #[arg(long, value_name = "V", default_value_t = 0.0, value_parser = ground())]
     ground: f64,
     /// Diameter of what presses, mm [default: 5, or a fifth of the shorter side if that is less]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = options::tip())]
     tip: Option<f64>,
     /// Foam at hand, one of the paper's, A to D; give it again for more [default: all four]
     #[arg(long, value_name = "A..D", conflicts_with = "foams")]
@@ -84,9 +85,6 @@ pub struct Args {
     /// Writes a page with charts of all that can be had, which needs nothing else
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
-    /// Replaces files that exist
-    #[arg(long, visible_alias = "force")]
-    overwrite: bool,
     /// Seed of the search: the same seed gives the same answer
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -137,8 +135,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(page) = args.out.as_ref().filter(|path| path.extension().is_some_and(|ending| ending == "html")) {
         bail!("--out {0}: the choice is written as a detector file, in TOML; for a page, --page {0}", page.display());
     }
-    let file = NewFile::optional(args.out.as_ref(), args.overwrite)?;
-    let page = NewFile::optional(args.page.as_ref(), args.overwrite)?;
+    let file = NewFile::optional(args.out.as_ref())?;
+    let page = NewFile::optional(args.page.as_ref())?;
     let answer = watched(|progress| search::answer(&plan, progress))?;
     let view = search::view(&answer);
     page.map(|page| page.write(view::page(std::slice::from_ref(&view), &output::command_line()))).transpose()?;
@@ -161,10 +159,7 @@ const GROUNDS_V: RangeInclusive<f64> = 0.0..=1.2;
 
 /// Parses a voltage that the ground is lifted to.
 pub(super) fn ground() -> impl TypedValueParser<Value = f64> {
-    clap::builder::NonEmptyStringValueParser::new().try_map(|text| match text.parse::<f64>() {
-        Ok(volts) if GROUNDS_V.contains(&volts) => Ok(volts),
-        _ => Err(format!("a voltage from {} to {} is needed", GROUNDS_V.start(), GROUNDS_V.end())),
-    })
+    options::number("a voltage (V)", GROUNDS_V)
 }
 
 /// The board that is named, or the usual one for so many electrodes, with its ground lifted so far (V).

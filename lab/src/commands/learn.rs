@@ -25,7 +25,7 @@ use tactomo_cli::output::{self, NewFile, message};
 /// with that of guessing the middle of all presses each time; where it is no better, it says so.
 ///
 /// Examples:
-///   tactomo-lab learn presses.csv --out skin.safetensors
+///   tactomo-lab learn presses.csv --out sensor.safetensors
 ///   tactomo-lab learn presses.npz --detector my-cal.toml --out mine.safetensors --json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -62,7 +62,7 @@ struct Report {
 
 /// Learns, and writes what was learned.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let out = NewFile::never_replacing(&args.out)?;
+    let out = NewFile::new(&args.out)?;
     let mut presses = Presses::read(&args.presses, &[])?;
     if let Some(chosen) = &args.detector {
         presses.drive_v = Some(drive_v(&chosen.get()?, presses.channels)?);

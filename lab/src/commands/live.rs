@@ -6,6 +6,7 @@ use serde::Serialize;
 use tactomo::run::scanning::ScanChoice;
 use tactomo_board::simulated::BoardModel;
 use tactomo_cli::choice;
+use tactomo_cli::options;
 use tactomo_cli::output::message;
 use tactomo_physics::scene::SceneName;
 use tactomo_study::view::{Format, MM, PERCENT, PLAIN, TEXT, Table, US, View};
@@ -45,11 +46,11 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_parser = choice::method(), hide_possible_values = true, default_value = "auto")]
     solver: Method,
     /// How long each runs (s)
-    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u64).range(1..=86_400))]
-    seconds: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "6", value_parser = options::seconds)]
+    seconds: Duration,
     /// Threads beside it that do nothing but keep cores busy
     #[arg(long, default_value_t = 0, value_name = "COUNT")]
-    busy: usize,
+    busy: u8,
     /// Takes the detector as it is described, learning nothing from what presses
     #[arg(long)]
     no_learning: bool,
@@ -72,6 +73,7 @@ struct Report {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let files = args.shown.files()?;
     let cases = cases(args);
+    cases.iter().try_for_each(Case::check)?;
     let (mut runs, mut failed) = (Vec::with_capacity(cases.len()), 0);
     for (index, case) in cases.iter().enumerate() {
         let what = match case.run() {
@@ -112,7 +114,7 @@ fn cases(args: &Args) -> Vec<Case> {
                     built: *built,
                     method: args.solver,
                     seed: args.seed,
-                    time: Duration::from_secs(args.seconds),
+                    time: args.seconds,
                     busy: args.busy,
                     learns: !args.no_learning,
                     offline: args.offline,
@@ -144,7 +146,7 @@ fn view(runs: &[Found]) -> View {
         .column("age p99", US, |run| run.age_p99_us)
         .column("learned", seconds, |run| run.learned_s)
         .note(
-            "right: share of the time with as many contacts as touch, or the right shape; offline: where the same bytes are answered frame by frame. or named: and with an answer that names that number as one it may be. error: of places, median; late: in the last third. \
+            "right: share of the time with as many contacts as touch, none off by more than 15 % of the distance of electrodes, or the right shape; offline: where the same bytes are answered frame by frame. or named: and with an answer that names that number as one it may be. error: of places, median; late: in the last third. \
              invented, doubtful: shares of the answers. gap: longest time without an answer. learned: when what presses taught was first used.",
         )
         .data();

@@ -51,3 +51,15 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Ablate(args) => ablate::run(&args),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::Cli;
+
+    #[test]
+    fn every_option_that_takes_a_number_says_what_is_needed() {
+        assert_eq!(tactomo_cli::options::untold(Cli::command()), [""; 0]);
+    }
+}

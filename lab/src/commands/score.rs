@@ -21,9 +21,9 @@ use tactomo_cli::output::{self, NewFile, command_line, message};
 /// have some, else in their order.
 ///
 /// Examples:
-///   tactomo-lab score skin.safetensors unseen.csv
-///   tactomo-lab score skin.safetensors unseen.csv --out score.html
-///   tactomo-lab score skin.safetensors unseen.npz --json
+///   tactomo-lab score sensor.safetensors unseen.csv
+///   tactomo-lab score sensor.safetensors unseen.csv --out score.html
+///   tactomo-lab score sensor.safetensors unseen.npz --json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -39,9 +39,6 @@ pub struct Args {
     /// Writes the map: a page (.html), or the drawing alone (.svg)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replaces the file if it exists
-    #[arg(long, requires = "out", visible_alias = "force")]
-    overwrite: bool,
 }
 
 /// Reads each press, and tells how far off it is.
@@ -58,7 +55,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         );
     };
     let presses = Presses::read(&args.presses, kernel.names())?;
-    let out = NewFile::optional(args.out.as_ref(), args.overwrite)?;
+    let out = NewFile::optional(args.out.as_ref())?;
     let scored = scored(&kernel, &presses).with_context(|| args.presses.display().to_string())?;
     let map = Map::of(&scored.errors());
     let report = Report::of(&scored, &map);

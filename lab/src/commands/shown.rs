@@ -22,15 +22,12 @@ pub struct Shown {
     /// Writes all figures as comma-separated values, a row for each thing that was computed
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Replaces files that exist
-    #[arg(long, visible_alias = "force")]
-    pub overwrite: bool,
     /// Prints all figures as JSON
     #[arg(long)]
     json: bool,
 }
 
-/// Files that are to be written: none of them is replaced against one's will.
+/// Files that are to be written.
 pub struct Files {
     out: Option<NewFile>,
     csv: Option<NewFile>,
@@ -39,8 +36,7 @@ pub struct Files {
 impl Shown {
     /// The files, before anything is computed.
     pub fn files(&self) -> anyhow::Result<Files> {
-        let file = |path: &Option<PathBuf>| NewFile::optional(path.as_ref(), self.overwrite);
-        Ok(Files { out: file(&self.out)?, csv: file(&self.csv)? })
+        Ok(Files { out: NewFile::optional(self.out.as_ref())?, csv: NewFile::optional(self.csv.as_ref())? })
     }
 
     /// Puts out what was found, and how it is shown.

@@ -11,7 +11,7 @@ use tactomo_cli::output;
 ///
 /// Varied are noise, converter, force, the distance of two contacts and of edges, thickness and
 /// conductivity, each tolerance of the detector, the baseline, faulty electrodes and more; and errors are compared with the
-/// Cramer-Rao bound. Takes a quarter of an hour or so of processor time, with --quick a minute. Ctrl-C keeps what is done.
+/// Cramer-Rao bound. Takes a quarter of an hour or so of processor time, with --quick some minutes. Ctrl-C keeps what is done.
 ///
 /// Examples:
 ///   tactomo-lab stability --quick --out stability.html
@@ -29,7 +29,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let Args { detector, study } = args;
     let files = study.shown.files()?;
-    let [places, frames] = study.places_and_frames(if study.quick { [1, 2] } else { [3, 2] });
+    let [places, frames] = study.places_and_frames(if study.quick { [5, 1] } else { [5, 2] });
     let plan = Plan {
         detector: detector.get()?,
         methods: study.methods(),

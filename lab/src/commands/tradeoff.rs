@@ -75,7 +75,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let Args { detector, study, picture, .. } = args;
     let files = study.shown.files()?;
-    let picture = NewFile::optional(picture.as_ref(), study.shown.overwrite)?;
+    let picture = NewFile::optional(picture.as_ref())?;
     let [places, frames] = study.places_and_frames(if study.quick { [2, 2] } else { [6, 5] });
     let plan = Plan {
         detectors: choice::detectors(detector, if study.quick { &DETECTORS[..1] } else { &DETECTORS })?,
@@ -102,7 +102,7 @@ fn scan(args: &Args) -> anyhow::Result<()> {
     let Args { detector, study, picture, .. } = args;
     anyhow::ensure!(detector.len() <= 1, "--scan is of one detector: give --detector once");
     let files = study.shown.files()?;
-    let picture = NewFile::optional(picture.as_ref(), study.shown.overwrite)?;
+    let picture = NewFile::optional(picture.as_ref())?;
     let own = if study.quick { SCENES[0] } else { SCENES[1] };
     let [scenes, _] = study.places_and_frames([own, 0]);
     let detector = choice::detectors(detector, &DETECTORS[..1])?.into_iter().next().unwrap_or_default();

@@ -14,6 +14,7 @@ use tactomo_touch::solve::{Lambda, Method, Parameter, Problem};
 
 use super::shown::Shown;
 use tactomo_cli::choice::{self, Model};
+use tactomo_cli::options;
 use tactomo_cli::output::message;
 
 /// Compares models and solvers with reference cases.
@@ -39,7 +40,7 @@ pub struct Args {
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     nodes: u32,
     /// Quantises the readings and adds noise of this standard deviation (LSB)
-    #[arg(long, value_name = "LSB", value_parser = noise)]
+    #[arg(long, value_name = "LSB", value_parser = options::number("noise (LSB)", 0.0..=1e6))]
     noise_lsb: Option<f64>,
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
@@ -51,7 +52,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_parser = choice::method(), hide_possible_values = true)]
     solver: Vec<Method>,
     /// Lambda of the solvers that have one, as a share of the largest singular value
-    #[arg(long, value_name = "SHARE", value_parser = positive)]
+    #[arg(long, value_name = "SHARE", value_parser = options::number("a share", 1e-12..=1e3))]
     lambda: Option<f64>,
     #[command(flatten)]
     shown: Shown,
@@ -101,20 +102,6 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
         reference_error: case.mesh_error_v / case.readings.largest_v(),
         solvers,
     })
-}
-
-fn noise(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(lsb) if (0.0..1e6).contains(&lsb) => Ok(lsb),
-        _ => Err("a number of LSB is needed, 0 or more".to_owned()),
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(share) if share > 0.0 && f64::is_finite(share) => Ok(share),
-        _ => Err("a number above 0 is needed".to_owned()),
-    }
 }
 
 /// A row for each case and solver.

@@ -10,7 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
-use tactomo::run::calibration::Learning;
+use tactomo::run::calibration::{Keeping, Learning};
 use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Listener, Snapshot, TouchEvent};
@@ -42,7 +42,7 @@ pub struct Case {
     /// How long.
     pub time: Duration,
     /// Threads that do nothing but keep cores busy.
-    pub busy: usize,
+    pub busy: u8,
     /// Whether the detector is learned from what presses.
     pub learns: bool,
     /// Whether the same bytes are answered once more, as fast as they can be read.
@@ -85,6 +85,19 @@ impl Listener for Keeper {
 }
 
 impl Case {
+    /// Checks what can be checked before anything runs.
+    pub fn check(&self) -> anyhow::Result<()> {
+        let electrodes = self.described().electrodes.len();
+        self.scan
+            .check(electrodes)
+            .map_err(|what| anyhow::anyhow!("--scan {}, scene {}: {what}", self.scan, self.scene))
+    }
+
+    /// The detector that its scene was made for.
+    fn described(&self) -> Detector {
+        self.scene.detector().and_then(Detector::preset).unwrap_or_default()
+    }
+
     /// Runs it. A thread of it that panics is an error like others: whatever ran before stays of use.
     pub fn run(&self) -> anyhow::Result<Found> {
         std::panic::catch_unwind(|| run(self)).unwrap_or_else(|_| anyhow::bail!("the solver panicked"))
@@ -105,7 +118,7 @@ impl fmt::Display for Case {
 
 /// Runs one case.
 fn run(case: &Case) -> anyhow::Result<Found> {
-    let detector = case.scene.detector().and_then(Detector::preset).unwrap_or_default();
+    let detector = case.described();
     let model = case.board.unwrap_or_else(|| BoardModel::usual(&detector));
     let detector = model.described(detector, case.built.is_some());
     let scene = Scene::new(case.scene, &detector, Hand::relative(&detector), case.seed);
@@ -117,7 +130,7 @@ fn run(case: &Case) -> anyhow::Result<Found> {
     let (recorder, file) = kept.map_or((None, None), |(recorder, file)| (Some(recorder), Some(file)));
     let options = |time| -> anyhow::Result<RunOptions> {
         let solving = Solving::new(case.method, Problem::of(&detector)?);
-        let learning = Learning::of(&detector, None).filter(|_| case.learns);
+        let learning = Learning::of(&detector, Keeping::Nowhere).filter(|_| case.learns);
         Ok(RunOptions {
             scan: case.scan.clone(),
             solving: Some(Solving { learning, ..solving }),
@@ -127,6 +140,7 @@ fn run(case: &Case) -> anyhow::Result<Found> {
     };
     let live = RunOptions { recorder, ..options(Some(case.time))? };
     let live = answered(&mut Opened::new(Box::new(board)), live, case.busy)?;
+    anyhow::ensure!(!live.answers.is_empty(), "no answer came in {:.3} s", case.time.as_secs_f64());
     let began_s = clock.began_s().unwrap_or_default();
     let scorer = Scorer::new(&detector, scene);
     let offline_right = file.map(|file| -> anyhow::Result<f64> {
@@ -161,7 +175,7 @@ struct Live {
 }
 
 /// Runs a source to its end, and keeps all answers.
-fn answered(source: &mut dyn Source, options: RunOptions, busy: usize) -> anyhow::Result<Live> {
+fn answered(source: &mut dyn Source, options: RunOptions, busy: u8) -> anyhow::Result<Live> {
     let kept = Arc::new(Mutex::new(Vec::new()));
     let options = RunOptions { listeners: vec![Box::new(Keeper(Arc::clone(&kept)))], ..options };
     let (snapshots, shown) = tokio::sync::watch::channel(Arc::new(Snapshot::default()));

@@ -3,17 +3,15 @@
 use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
-use tactomo_physics::scene::{Contact, Scene, Shape, Touch};
+use tactomo_physics::scene::Scene;
+use tactomo_study::judge::{Judged, WRONG_SHARE, wrong_m};
 use tactomo_study::score::quantiles;
-use tactomo_touch::metrics::Matching;
-use tactomo_touch::solve::{Alternative, FoundShape, Solution};
+use tactomo_touch::solve::{Alternative, Solution};
 
 /// Conductance of a contact that has to be found, in sheet conductances: `lab/examples/floor.rs` has lighter ones found in most frames, not in all.
 const PLAIN: f64 = 0.03;
-/// How far off a contact may be found, as a share of the shorter side: 10 mm on 60 mm. What is farther off is another one.
-const REACH: f64 = 1.0 / 6.0;
-/// Share of the reach by which a touch moves at most from an answer to the next.
-const MOVED: f64 = 0.3;
+/// How far a touch moves at most from an answer to the next, in mean distances of electrodes: 3 mm of 15.
+const MOVED: f64 = 0.2;
 /// Share of the run at its end that late errors are of.
 const LATE: f64 = 1.0 / 3.0;
 
@@ -31,13 +29,13 @@ pub struct Answer {
 pub struct Scored {
     /// Answers.
     pub answers: usize,
-    /// Share of the time in which what was shown was right: as many contacts as there are, each within reach, or the right shape.
+    /// Share of the time in which what was shown was right: as many contacts as there are, none too far off (`judge::WRONG_SHARE`), or the right shape.
     pub right: f64,
     /// Share of the time in which it was right, or the number of contacts there are was named as one that it may be.
     pub named: f64,
     /// Time from the first frame to the first right answer to a touch (s); `None` if there was none.
     pub first_right_s: Option<f64>,
-    /// Error of places, median and 95 % (m).
+    /// Error of places, however far, median and 95 % (m).
     pub error_m: Option<f64>,
     pub error_p95_m: Option<f64>,
     /// Median in the last third of the run (m).
@@ -56,7 +54,7 @@ pub struct Scored {
 pub struct Scorer {
     scene: Scene,
     plain_s: f64,
-    reach_m: f64,
+    wrong_m: f64,
 }
 
 /// What an answer is worth.
@@ -73,8 +71,7 @@ struct Worth {
 impl Scorer {
     /// For a scene on a detector.
     pub fn new(detector: &Detector, scene: Scene) -> Self {
-        let [width_m, height_m] = detector.outline.size_m();
-        Self { scene, plain_s: PLAIN * detector.sheet_conductance_s(), reach_m: REACH * width_m.min(height_m) }
+        Self { scene, plain_s: PLAIN * detector.sheet_conductance_s(), wrong_m: wrong_m(detector) }
     }
 
     /// Scores all answers of a run whose scene began at this board time (s).
@@ -110,32 +107,23 @@ impl Scorer {
     }
 
     fn worth(&self, time_s: f64, solution: &Solution) -> Worth {
-        let truth = self.scene.at(time_s);
-        let is_touched = truth.iter().any(|touch| touch.conductance_s > self.plain_s);
-        let discs: Vec<Contact> = truth.iter().filter_map(Touch::disc).collect();
-        let other = truth.iter().find(|touch| touch.disc().is_none());
-        let found = if solution.is_contacts() { &solution.contacts[..] } else { &[] };
-        let matched = Matching::within(self.reach_m, &discs, found);
-        let is_missed = |index: &usize| discs[*index].conductance_s > self.plain_s;
-        let is_shape = match (other.map(|touch| &touch.shape), &solution.shape) {
-            (None, shape) => shape.is_none(),
-            (Some(Shape::Ring { .. }), shape) => matches!(shape, Some(FoundShape::Ring(_))),
-            (Some(_), shape) => matches!(shape, Some(FoundShape::Line(_))),
-        };
-        let is_invented = !matched.invented.is_empty() || solution.shape.is_some() && other.is_none();
-        let has_all = !matched.missed.iter().any(is_missed) && (other.is_some() || solution.is_contacts());
-        let ids = matched.pairs.iter().filter_map(|pair| {
-            let touch = &discs[pair.truth];
+        let touches = self.scene.at(time_s);
+        let is_plain = |conductance_s: f64| conductance_s > self.plain_s;
+        let judged = Judged::of(self.wrong_m, &touches, solution);
+        let Judged { found, truth, near, is_kind_right } = &judged;
+        let ids = near.pairs.iter().filter_map(|pair| {
+            let touch = &truth[pair.truth];
             Some(([touch.x_m, touch.y_m], found[pair.found].id?))
         });
-        let plain = discs.iter().filter(|disc| disc.conductance_s > self.plain_s).count();
-        let is_count = |other: &Alternative| (plain..=discs.len()).contains(&other.contacts);
+        let plain = truth.iter().filter(|disc| is_plain(disc.conductance_s)).count();
+        let is_count = |other: &Alternative| (plain..=truth.len()).contains(&other.contacts);
+        let are_discs = touches.iter().all(|touch| touch.disc().is_some());
         Worth {
-            is_touched,
-            is_named: other.is_none() && solution.is_contacts() && solution.alternative.as_ref().is_some_and(is_count),
-            is_right: is_shape && has_all && !is_invented,
-            has_invented: is_invented,
-            errors_m: matched.pairs.iter().map(|pair| pair.distance_m).collect(),
+            is_touched: touches.iter().any(|touch| is_plain(touch.conductance_s)),
+            is_named: are_discs && *is_kind_right && solution.alternative.as_ref().is_some_and(is_count),
+            is_right: judged.is_right(|disc| is_plain(disc.conductance_s)),
+            has_invented: !near.invented.is_empty() || are_discs && solution.shape.is_some(),
+            errors_m: judged.pairs().pairs.iter().map(|pair| pair.distance_m).collect(),
             ids: ids.collect(),
         }
     }
@@ -144,7 +132,7 @@ impl Scorer {
         let is_other = |(at_m, id): &&([f64; 2], u32)| {
             let apart_m = |other_m: &[f64; 2]| (at_m[0] - other_m[0]).hypot(at_m[1] - other_m[1]);
             let nearest = before.ids.iter().min_by(|a, b| apart_m(&a.0).total_cmp(&apart_m(&b.0)));
-            nearest.is_some_and(|(other_m, other)| apart_m(other_m) < MOVED * self.reach_m && other != id)
+            nearest.is_some_and(|(other_m, other)| apart_m(other_m) < MOVED / WRONG_SHARE * self.wrong_m && other != id)
         };
         after.ids.iter().filter(is_other).count()
     }
@@ -156,7 +144,7 @@ mod tests {
 
     use super::*;
     use tactomo_physics::scene::{Hand, SceneName};
-    use tactomo_touch::solve::{FoundContact, FoundRing};
+    use tactomo_touch::solve::{FoundContact, FoundRing, FoundShape};
 
     const FRAME_S: f64 = 0.01;
 
@@ -194,7 +182,7 @@ mod tests {
             [
                 contacts(Vec::new()),
                 contacts(vec![at(0.001, 1)]),
-                contacts(vec![at(0.003, 2)]),
+                contacts(vec![at(0.002, 2)]),
                 contacts(vec![at(0.001, 2), other]),
             ]
             .into_iter()

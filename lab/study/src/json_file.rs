@@ -1,13 +1,14 @@
 //! JSON files of other programs, as they are or compressed by gzip.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
 use flate2::bufread::MultiGzDecoder;
+use tactomo_table::file::Format;
 
-/// Longest text that is read (bytes): readings of some ten thousand scenes.
-const LONGEST: u64 = 256 << 20;
+/// Readings of some ten thousand scenes.
+const FORMAT: Format = Format::new("a file of cases", 256 << 20);
 
 /// Bytes that a compressed file begins with (RFC 1952).
 const GZIP: [u8; 2] = [0x1f, 0x8b];
@@ -18,19 +19,11 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// What the system says; that it is damaged, longer than is read, or no text.
 pub(crate) fn text(path: &Path) -> io::Result<String> {
     let mut file = BufReader::new(File::open(path)?);
-    match file.fill_buf()?.starts_with(&GZIP) {
-        true => whole(MultiGzDecoder::new(file)),
-        false => whole(file),
-    }
-}
-
-fn whole(file: impl Read) -> io::Result<String> {
-    let mut text = String::new();
-    let length = file.take(LONGEST + 1).read_to_string(&mut text)?;
-    if length as u64 > LONGEST {
-        return Err(io::Error::other(format!("longer than {} MiB", LONGEST >> 20)));
-    }
-    Ok(text)
+    let bytes = match file.fill_buf()?.starts_with(&GZIP) {
+        true => FORMAT.read_from(MultiGzDecoder::new(file)),
+        false => FORMAT.read_from(file),
+    };
+    FORMAT.text(bytes?)
 }
 
 #[cfg(test)]

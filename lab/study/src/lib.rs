@@ -10,6 +10,7 @@ pub mod contacts;
 mod experiment;
 pub mod growth;
 mod json_file;
+pub mod judge;
 mod machine;
 pub mod picard;
 mod presses;

@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use super::experiment::{Experiment, Frame};
+use super::judge::{Judged, wrong_m};
 use super::stopwatch::timed;
 pub use super::summary::{ChosenReport, Spread, Summary, Times, quantiles};
 use tactomo_physics::forward::{ForwardError, ImageMesh};
-use tactomo_physics::scene::{Contact, Touch};
+use tactomo_physics::scene::Touch;
 use tactomo_touch::metrics::{
     Comparison, Greit, ImageMetrics, Matching, PaperFigures, found_s_per_m2, shape_error_m, truth_s_per_m2,
 };
@@ -26,15 +27,20 @@ pub struct Score {
     pub failed: bool,
     /// Something of it was no finite number.
     pub not_finite: bool,
-    /// Number of contacts found.
-    pub found: usize,
+    /// Whether the answer is wrong, as [`Judged`] says of contacts: refused, not finite, of another kind than what touches, with a contact missed, invented or
+    /// too far off; of touches that are no discs, an error as large or a [wrong image](Self::is_wrong_image).
+    pub is_wrong: bool,
+    /// Whether [it says itself](Judged::is_covered) how far off it is.
+    pub is_covered: bool,
     /// Mean error with those missed and invented (m): [`Matching::ospa_m`]; of touches that are no discs [`shape_error_m`].
     pub error_m: Option<f64>,
     /// Mean distance of contacts found (m), however far.
     pub position_error_m: Option<f64>,
-    /// Contacts not found within reach.
+    /// Whether as many contacts were found as touch.
+    pub is_number_right: Option<bool>,
+    /// Contacts that nothing was found near to.
     pub missed: Option<usize>,
-    /// Contacts found that are not there.
+    /// Contacts found that nothing is near to.
     pub invented: Option<usize>,
     /// Mean relative error of the conductance of contacts found.
     pub conductance_error: Option<f64>,
@@ -82,12 +88,6 @@ impl Chosen {
 }
 
 impl Score {
-    /// Whether the answer is wrong, whatever its error is: refused, not finite, or with a contact missed or invented.
-    pub fn is_wrong(&self) -> bool {
-        let miscounted = self.missed.unwrap_or(0) + self.invented.unwrap_or(0) > 0;
-        self.failed || self.not_finite || miscounted
-    }
-
     /// Whether the image is wrong: refused, not finite, or explaining less than half of the truth's variance.
     pub fn is_wrong_image(&self) -> bool {
         let explained = self.image.correlation.map_or(0.0, |correlation| correlation.max(0.0).powi(2));
@@ -97,7 +97,9 @@ impl Score {
 
 /// Scores solutions on one detector.
 pub struct Scorer {
+    /// What a contact missed or invented counts (m).
     reach_m: f64,
+    wrong_m: f64,
     /// Where touches that are no discs are compared with what was found; `None` if images are.
     shapes: Option<ImageMesh>,
     images: Option<Images>,
@@ -116,13 +118,17 @@ struct Images {
 impl Scorer {
     /// For solutions of an experiment's problem.
     pub fn new(experiment: &Experiment) -> Self {
-        Self { reach_m: experiment.reach_m(), shapes: None, images: Some(Images::new(experiment)) }
+        Self { images: Some(Images::new(experiment)), ..Self::of(experiment) }
     }
 
     /// For errors alone: images are looked at where touches are no discs, which then have the [error](shape_error_m) of a shape.
     pub fn of_errors(experiment: &Experiment) -> Self {
-        let shapes = Some(experiment.problem.jacobian.image_mesh.clone());
-        Self { reach_m: experiment.reach_m(), shapes, images: None }
+        Self { shapes: Some(experiment.problem.jacobian.image_mesh.clone()), ..Self::of(experiment) }
+    }
+
+    fn of(experiment: &Experiment) -> Self {
+        let (reach_m, wrong_m) = (experiment.reach_m(), wrong_m(&experiment.detector));
+        Self { reach_m, wrong_m, shapes: None, images: None }
     }
 
     /// Lets a solver read frames one after the other, and scores what it found.
@@ -138,7 +144,7 @@ impl Scorer {
         let (result, time) = timed(|| solver.solve(&frame.readings));
         match result {
             Ok(solution) => Ok(Score { time, ..self.score(frame, &solution)? }),
-            Err(_) => Ok(Score { time, failed: true, ..Score::default() }),
+            Err(_) => Ok(Score { time, failed: true, is_wrong: true, ..Score::default() }),
         }
     }
 
@@ -148,33 +154,41 @@ impl Scorer {
     /// [`ForwardError`] if the truth cannot be imaged.
     pub fn score(&mut self, frame: &Frame, solution: &Solution) -> Result<Score, ForwardError> {
         let mut score = Score {
-            found: solution.contacts.len(),
             not_finite: !is_finite(solution),
             flags: solution.flags.clone(),
             residual: solution.residual,
             chosen: Chosen::of(solution),
             ..Score::default()
         };
-        if let Some(truth) = &frame.contacts {
-            self.score_contacts(truth, &solution.contacts, &mut score);
+        if let Some(images) = self.images.as_mut().filter(|_| !frame.touches.is_empty()) {
+            images.score(frame, solution, &mut score)?;
+        }
+        score.is_wrong = if frame.contacts.is_some() {
+            self.score_contacts(&frame.touches, solution, &mut score)
         } else if let Some(mesh) = &self.shapes {
             let [truth, found] =
                 [truth_s_per_m2(mesh, &frame.touches)?, found_s_per_m2(mesh, solution, self.reach_m * POINT_SHARE)];
             score.error_m = shape_error_m(mesh, &truth, &found, self.reach_m);
-        }
-        if let Some(images) = self.images.as_mut().filter(|_| !frame.touches.is_empty()) {
-            images.score(frame, solution, &mut score)?;
-        }
+            score.error_m.is_none_or(|error_m| error_m > self.wrong_m)
+        } else {
+            score.is_wrong_image()
+        };
+        score.is_wrong |= score.not_finite;
         Ok(score)
     }
 
-    fn score_contacts(&self, truth: &[Contact], found: &[FoundContact], score: &mut Score) {
-        let matching = Matching::within(self.reach_m, truth, found);
-        score.error_m = Some(matching.ospa_m(self.reach_m));
-        score.missed = Some(matching.missed.len());
-        score.invented = Some(matching.invented.len());
-        score.conductance_error = matching.conductance_error(truth, found);
-        score.position_error_m = Matching::within(f64::INFINITY, truth, found).position_error_m();
+    /// Scores an answer to discs, and tells whether it is wrong.
+    fn score_contacts(&self, touches: &[Touch], solution: &Solution, score: &mut Score) -> bool {
+        let judged = Judged::of(self.wrong_m, touches, solution);
+        let Judged { found, truth, near, .. } = &judged;
+        score.error_m = Some(Matching::within(self.reach_m, truth, found).ospa_m(self.reach_m));
+        score.position_error_m = judged.pairs().position_error_m();
+        score.is_number_right = Some(judged.is_number_right());
+        score.missed = Some(near.missed.len());
+        score.invented = Some(near.invented.len());
+        score.conductance_error = near.conductance_error(truth, found);
+        score.is_covered = judged.is_covered();
+        !judged.is_right(|_| true)
     }
 }
 
@@ -224,6 +238,8 @@ mod tests {
     use super::*;
     use crate::SceneKind;
     use tactomo_physics::detector::Detector;
+    use tactomo_physics::scene::Contact;
+    use tactomo_touch::solve::FoundLine;
 
     fn experiment() -> Experiment {
         Experiment::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
@@ -232,6 +248,20 @@ mod tests {
     fn frame(experiment: &Experiment, kind: SceneKind) -> Frame {
         let touches = kind.frames(&experiment.detector, 1, 1);
         experiment.frames(&touches, 1).unwrap().remove(0)
+    }
+
+    #[test]
+    fn two_discs_that_are_told_as_a_line_are_wrong_whatever_is_kept_beside_it() {
+        let experiment = experiment();
+        let frame = frame(&experiment, SceneKind::TwoNear);
+        let truth = truth_of(&frame);
+        let line = Solution { shape: Some(FoundShape::Line(FoundLine::default())), ..truth.clone() };
+        for mut scorer in [Scorer::new(&experiment), Scorer::of_errors(&experiment)] {
+            let [right, wrong] = [&truth, &line].map(|answer| scorer.score(&frame, answer).unwrap());
+            assert_eq!((right.is_wrong, right.is_number_right), (false, Some(true)));
+            assert_eq!((wrong.is_wrong, wrong.is_number_right, wrong.missed), (true, Some(false), Some(2)));
+            assert_eq!(wrong.error_m, Some(experiment.reach_m()));
+        }
     }
 
     fn truth_of(frame: &Frame) -> Solution {
@@ -245,11 +275,11 @@ mod tests {
         let mut scorer = Scorer::new(&experiment);
         let frame = frame(&experiment, SceneKind::Three);
         let best = scorer.score(&frame, &truth_of(&frame)).unwrap();
-        assert_eq!((best.error_m, best.missed, best.invented), (Some(0.0), Some(0), Some(0)));
+        assert_eq!((best.error_m, best.missed, best.invented, best.is_wrong), (Some(0.0), Some(0), Some(0), false));
         assert!(best.conductance_error.is_some_and(|error| error < 1e-12));
         assert!(best.image.correlation.is_some_and(|correlation| correlation > 0.95), "{:?}", best.image);
         let worst = scorer.score(&frame, &Solution::default()).unwrap();
-        assert_eq!((worst.error_m, worst.missed), (Some(experiment.reach_m()), Some(3)));
+        assert_eq!((worst.error_m, worst.missed, worst.is_wrong), (Some(experiment.reach_m()), Some(3), true));
         let summary = Summary::of([&best, &worst]);
         assert_eq!((summary.missed, summary.count_right), (Some(1.5), Some(0.5)));
     }
@@ -269,13 +299,14 @@ mod tests {
         let frame = frame(&experiment, SceneKind::Line);
         let truth = truth_s_per_m2(&experiment.problem.jacobian.image_mesh, &frame.touches).unwrap();
         let right = Solution { image_s_per_m2: Some(truth), ..Solution::default() };
-        assert_eq!(scorer.score(&frame, &right).unwrap().error_m, Some(0.0));
+        let score = scorer.score(&frame, &right).unwrap();
+        assert_eq!((score.error_m, score.is_wrong), (Some(0.0), false));
         let [x_m, y_m] = frame.touches[0].centre_m;
         let middle = Solution { contacts: vec![FoundContact::flat(x_m, y_m, 1e-3)], ..Solution::default() };
         let error_m = scorer.score(&frame, &middle).unwrap().error_m.unwrap();
         assert!(error_m > 0.002 && error_m < experiment.reach_m(), "{error_m}");
         let nothing = scorer.score(&frame, &Solution::default()).unwrap();
-        assert_eq!((nothing.error_m, nothing.missed), (Some(experiment.reach_m()), None));
+        assert_eq!((nothing.error_m, nothing.missed, nothing.is_wrong), (Some(experiment.reach_m()), None, true));
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub struct Summary {
     pub wrong: f64,
     /// Mean distance of contacts found (m).
     pub position_error_m: Option<f64>,
-    /// Share of frames with no contact missed and none invented.
+    /// Share of frames with as many contacts as touch.
     pub count_right: Option<f64>,
     /// Contacts missed, a frame.
     pub missed: Option<f64>,
@@ -137,9 +137,9 @@ impl Summary {
             not_finite: share(&|score| score.not_finite),
             error_m: mean(&|score| score.error_m),
             error_spread_m: Spread::of(scores.iter().filter_map(|score| score.error_m)),
-            wrong: share(&|score| score.is_wrong()),
+            wrong: share(&|score| score.is_wrong),
             position_error_m: mean(&|score| score.position_error_m),
-            count_right: mean(&|score| Some(f64::from(u8::from(score.missed? + score.invented? == 0)))),
+            count_right: mean(&|score| Some(f64::from(u8::from(score.is_number_right?)))),
             missed: mean(&|score| score.missed.map(|count| count as f64)),
             invented: mean(&|score| score.invented.map(|count| count as f64)),
             conductance_error: median(scores.iter().filter_map(|score| score.conductance_error)),

@@ -181,7 +181,209 @@ fn a_coded_body_has_one_form() {
     }
 }
 
+/// A coded frame of one row that is like its key, and the key: packets of any number and age, ground and time.
+fn row(sequence: u16, ground: u8, time_us: u32) -> Frame {
+    Frame {
+        head: FrameHead { sequence, time_us, ..FrameHead::default() },
+        scope: Scope::of_rows(16, &[ground], 0xF).unwrap(),
+        readings: Fixed::from_slice(&[100 + u16::from(ground); 4]).unwrap(),
+    }
+}
+
+fn coded_row(sequence: u16, ground: u8, time_us: u32, age: u8) -> Vec<u8> {
+    let ([s0, s1], [t0, t1, t2, t3]) = (sequence.to_le_bytes(), time_us.to_le_bytes());
+    packet(0x44, &[s0, s1, t0, t1, t2, t3, 0, 0, age, 16, 1, ground, 0xF, 0, 0])
+}
+
+/// An age is one byte: a key that is older than it tells is no key, whatever else came meanwhile.
+#[test]
+fn a_key_of_more_than_255_frames_is_none_whatever_age_is_named() {
+    for gap in 0..=1030u16 {
+        let first = 65_300;
+        for every in [u16::MAX, 100] {
+            let mut receiver = BoardReceiver::default();
+            let mut take = |wire: &[u8]| receiver.receive(&mut &wire[..]).unwrap();
+            let plain = |sequence: u16, ground| board_wire(&BoardMessage::Frame(row(sequence, ground, 0)));
+            assert!(take(&plain(first, 3)).is_ok());
+            // Frames of another ground.
+            for between in (1..gap).filter(|between| between.is_multiple_of(every)) {
+                assert!(take(&plain(first.wrapping_add(between), 4)).is_ok());
+            }
+            let sequence = first.wrapping_add(gap);
+            let result = take(&coded_row(sequence, 3, 0, gap as u8));
+            let expected = match gap {
+                1..=255 => Ok(BoardMessage::Frame(row(sequence, 3, 0))),
+                _ if gap.is_multiple_of(256) => Err(DecodeError::Body),
+                _ => Err(DecodeError::Key),
+            };
+            assert_eq!(result, expected, "{gap} frames later");
+        }
+    }
+    // Nor does a sender name such a key: one row of sixteen would be sent as it is after 512 frames else.
+    for (gap, codes) in [(255, true), (256, false), (257, false), (511, false), (515, false)] {
+        let mut sender = Sender::default();
+        sender.send(&row(0, 3, 0));
+        (1..gap).for_each(|sequence| _ = sender.send(&row(sequence, 4, 0)));
+        assert_eq!(sender.send(&row(gap, 3, 0)).1, codes, "{gap}");
+    }
+}
+
+/// Numbers begin anew after 65535: who was away for so long has no key, though its last one has the number of one that it missed.
+#[test]
+fn a_key_that_was_missed_is_not_taken_for_the_one_of_the_same_number_before() {
+    let mut sender = Sender::default();
+    let send = |sender: &mut Sender, number: u32, reading: u16| {
+        let head = FrameHead { sequence: number as u16, time_us: 70 * number, ..FrameHead::default() };
+        let frame =
+            Frame { head, scope: Scope::whole(4).unwrap(), readings: Fixed::from_slice(&[reading; 16]).unwrap() };
+        sender.send(&frame).0
+    };
+    let mut receiver = BoardReceiver::default();
+    let mut take = |wire: Vec<u8>| receiver.receive(&mut &wire[..]).unwrap();
+    assert!(take(send(&mut sender, 0, 5005)).is_ok());
+    (1..=65_536).for_each(|number| _ = send(&mut sender, number, 5006));
+    assert_eq!(take(send(&mut sender, 65_537, 5006)), Err(DecodeError::Key));
+    let later: Vec<_> = (65_538..65_580).map(|number| take(send(&mut sender, number, 5006))).collect();
+    let right =
+        |result: &Result<_, _>| matches!(result, Ok(BoardMessage::Frame(frame)) if frame.readings == [5006; 16]);
+    assert!(later.iter().all(|result| right(result) || *result == Err(DecodeError::Key)));
+    assert!(right(&later[40]), "and goes on from the next key");
+}
+
+/// Time in which numbers may have begun anew: four seconds, of which nobody tells how many frames they were.
+#[test]
+fn after_four_seconds_without_a_frame_there_is_no_key() {
+    for (gap_us, is_kept) in [(0, true), (4_000_000, true), (4_000_001, false), (u32::MAX, false)] {
+        let start_us = u32::MAX - 1_000_000;
+        let key = board_wire(&BoardMessage::Frame(row(7, 3, start_us)));
+        let coded = coded_row(9, 3, start_us.wrapping_add(gap_us), 2);
+        let result = receive_board(&[&key, &coded]).0.remove(1);
+        assert_eq!(result.is_ok(), is_kept, "{gap_us} us: {result:?}");
+        let mut sender = Sender::default();
+        sender.send(&row(7, 3, start_us));
+        assert_eq!(sender.send(&row(9, 3, start_us.wrapping_add(gap_us))).1, is_kept, "{gap_us} us");
+    }
+}
+
+#[test]
+fn keys_are_of_one_number_of_electrodes_and_as_many_as_there_is_room_for() {
+    let frame = |sequence, electrodes: usize| whole(sequence, &vec![9; electrodes * electrodes]);
+    let mut sender = Sender::default();
+    let codes: Vec<bool> = [(0, 5), (1, 5), (2, 6), (3, 5), (4, 5), (5, 32), (6, 32)]
+        .map(|(sequence, electrodes)| sender.send(&frame(sequence, electrodes)).1)
+        .to_vec();
+    assert_eq!(codes, [false, true, false, false, true, false, true]);
+    let mut narrow = Keys::<25>::default();
+    let mut codes = |frame: &Frame| {
+        let mut out = [0; MAX_WIRE];
+        encode_keyed(frame.head, &frame.scope, &frame.readings, &mut narrow, &mut out).unwrap();
+        out[1] & 15 == Kind::CodedFrame as u8
+    };
+    let narrow_codes = [(0, 5), (1, 5), (2, 6), (3, 6), (4, 5), (5, 5)].map(|(sequence, n)| codes(&frame(sequence, n)));
+    assert_eq!(narrow_codes, [false, true, false, false, false, true]);
+    // What is wrong with a body is told first, then that there is no key, then what is wrong with the differences.
+    let result = |wires: &[&[u8]]| receive_board(wires).0.pop().unwrap();
+    let key = board_wire(&BoardMessage::Frame(row(0, 3, 0)));
+    let of = |age, scope: &[u8], bits: &[u8]| packet(0x44, &[&[1, 0, 0, 0, 0, 0, 0, 0, age], scope, bits].concat());
+    let (good, bad) = (&[16, 1, 3, 0xF, 0][..], &[16, 1, 16, 0xF, 0][..]);
+    assert_eq!(result(&[&of(1, bad, &[0])]), Err(DecodeError::Body));
+    assert_eq!(result(&[&of(0, good, &[0])]), Err(DecodeError::Body));
+    assert_eq!(result(&[&of(1, good, &[0, 0, 0])]), Err(DecodeError::Key));
+    assert_eq!(result(&[&key, &of(1, good, &[0, 0, 0])]), Err(DecodeError::Body));
+    assert!(result(&[&key, &of(1, good, &[0])]).is_ok());
+}
+
+/// The rules of the page for a whole frame of 4 electrodes, bit by bit: its readings, or `None` if it is refused.
+fn by_the_page(k: u32, bits: &[u8], key: &[u16]) -> Option<Vec<u16>> {
+    let all: Vec<u64> = bits.iter().flat_map(|byte| (0..8).map(move |bit| u64::from(byte >> bit & 1))).collect();
+    let mut at = 0;
+    let mut number = |count: usize| {
+        let bits = all.get(at..at + count)?;
+        at += count;
+        Some(bits.iter().enumerate().map(|(place, bit)| bit << place).sum::<u64>())
+    };
+    let mut readings = Vec::new();
+    for key in key {
+        let mut q = 0;
+        while q < 8 && number(1)? == 1 {
+            q += 1;
+        }
+        let z = if q == 8 { number(17)? } else { (q << k) + number(k as usize)? };
+        if q == 8 && z >> k < 8 {
+            return None;
+        }
+        let d = if z % 2 == 0 { (z / 2) as i64 } else { -(z as i64 + 1) / 2 };
+        readings.push(u16::try_from(i64::from(*key) + d).ok()?);
+    }
+    let is_end = all.len() - at < 8 && all[at..].iter().all(|bit| *bit == 0);
+    is_end.then_some(readings)
+}
+
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn differences_of_any_bits_are_read_by_the_page_or_refused_by_it(
+        k in 0..16u32,
+        key in prop::collection::vec(prop_oneof![any::<u16>(), 0..40u16, 65500..=65535u16], 16),
+        near in prop::collection::vec(prop_oneof![4 => -20..20i32, 1 => -70_000..70_000i32], 16),
+        flips in prop::collection::vec(any::<prop::sample::Index>(), 0..2),
+        more in prop_oneof![6 => Just(0isize), 1 => -1..=1isize],
+    ) {
+        // Written by the page too.
+        let mut bits: Vec<u8> = Vec::new();
+        for d in near {
+            let z = if d >= 0 { 2 * d } else { -2 * d - 1 } as u64 & 0x1_FFFF;
+            let (head, low, count) = if z >> k < 8 { (z >> k, z, k) } else { (8, z, 17) };
+            bits.extend((0..head).map(|_| 1).chain((head < 8).then_some(0)));
+            bits.extend((0..count).map(|bit| (low >> bit & 1) as u8));
+        }
+        let mut bytes: Vec<u8> = bits.chunks(8).map(|bits| bits.iter().rev().fold(0, |byte, bit| byte << 1 | bit)).collect();
+        bytes.resize(bytes.len().saturating_add_signed(more), 0);
+        for flip in flips {
+            let at = flip.index(8 * bytes.len().max(1));
+            bytes.get_mut(at / 8).into_iter().for_each(|byte| *byte ^= 1 << (at % 8));
+        }
+        let frame = whole(0, &key);
+        let wire = packet(0x44, &[&[1, 0, 0, 0, 0, 0, 0, k as u8, 1, 4, 0], &bytes[..]].concat());
+        let result = receive_board(&[&board_wire(&BoardMessage::Frame(frame)), &wire]).0.remove(1);
+        let readings = match result {
+            Ok(BoardMessage::Frame(frame)) => Some(frame.readings.to_vec()),
+            Err(DecodeError::Body) => None,
+            other => panic!("{other:?}"),
+        };
+        prop_assert_eq!(readings, by_the_page(k, &bytes, &key));
+    }
+
+    /// Whatever is lost, comes again or is late: a frame that is taken is the one that was sent.
+    #[test]
+    fn on_any_line_a_frame_that_is_taken_is_the_one_that_was_sent(
+        steps in prop::collection::vec((0..3u8, prop_oneof![8 => 1..4u16, 1 => 200..400u16, 1 => any::<u16>()], 0..4u8, any::<u16>()), 1..80),
+        first in any::<u16>(),
+    ) {
+        let (mut sender, mut receiver) = (Sender::default(), BoardReceiver::default());
+        let (mut sequence, mut time_us) = (first, 0u32);
+        for (ground, step, fate, reading) in steps {
+            (sequence, time_us) = (sequence.wrapping_add(step), time_us.wrapping_add(100 * u32::from(step)));
+            let mut frame = row(sequence, ground, time_us);
+            frame.readings.iter_mut().for_each(|place| *place = reading % 50);
+            let (wire, _) = sender.send(&frame);
+            let mut take = || receiver.receive(&mut &wire[..]).unwrap();
+            match fate {
+                0 => {}
+                1 => {
+                    let once = take();
+                    prop_assert!(once == Ok(BoardMessage::Frame(frame)) || once == Err(DecodeError::Key));
+                    prop_assert!(once.is_err() || take() == Err(DecodeError::Repeated));
+                }
+                _ => {
+                    let once = take();
+                    prop_assert!(once == Ok(BoardMessage::Frame(frame)) || once == Err(DecodeError::Key), "{:?}", once);
+                }
+            }
+        }
+    }
+
     #[test]
     fn any_readings_come_back(
         (scope, frames) in scope().prop_flat_map(|scope| {

@@ -137,7 +137,7 @@ fn clock() -> impl Strategy<Value = BoardMessage> {
 }
 
 fn contacts() -> impl Strategy<Value = BoardMessage> {
-    let contact = (any::<u8>(), any::<[i16; 2]>(), any::<u16>(), any::<u8>());
+    let contact = (1u8.., any::<[i16; 2]>(), any::<u16>(), any::<u8>());
     let contact = contact.prop_map(|(id, at, conductance, sigma)| ContactCode { id, at, conductance, sigma });
     let all = [ContactFlags::MORE, ContactFlags::MISFIT, ContactFlags::SATURATED, ContactFlags::RESTING];
     let flags = prop::sample::subsequence(all.to_vec(), 0..=4).prop_map(|raised| {

@@ -1,9 +1,9 @@
 //! The edges of the protocol: other versions, bodies that break a rule, and messages that are too long.
 
 use tactomo_protocol::{
-    BoardMessage, Command, Counters, DecodeError, EncodeError, Fault, FrameHead, Hello, MAX_COMMAND, MAX_WIRE, OLDEST,
-    Plan, Range, Request, Scope, Settings, Status, VERSION, encode_board, encode_frame, encode_log, encode_request,
-    encode_rows, wire_bytes,
+    BoardMessage, Command, ContactCode, ContactFlags, Contacts, Counters, DecodeError, EncodeError, Fault, Frame,
+    FrameHead, Hello, MAX_COMMAND, MAX_WIRE, OLDEST, Plan, Range, Request, Scope, Settings, Status, VERSION,
+    encode_board, encode_frame, encode_log, encode_request, encode_rows, wire_bytes,
 };
 
 use crate::common::{board_wire, hello, packet, receive_board, receive_command, request_wire};
@@ -12,6 +12,7 @@ use crate::common::{board_wire, hello, packet, receive_board, receive_command, r
 const HELLO: u8 = VERSION << 4;
 const FRAME: u8 = VERSION << 4 | 1;
 const FAULT: u8 = VERSION << 4 | 3;
+const CONTACTS: u8 = VERSION << 4 | 5;
 const COMMAND: u8 = VERSION << 4 | 8;
 
 fn board_result(head: u8, body: &[u8]) -> Result<BoardMessage, DecodeError> {
@@ -24,12 +25,14 @@ fn command_result(head: u8, body: &[u8]) -> Result<Request, DecodeError> {
 
 #[test]
 fn another_version_is_named_whatever_the_kind_and_the_body() {
-    for version in (0..16).filter(|version| !(OLDEST..=VERSION).contains(version)) {
+    for version in (0..16).filter(|version| *version != VERSION) {
         for kind in 0..16 {
             for body in [&[][..], &[1; 8], &[0xFF; 16]] {
                 let head = version << 4 | kind;
-                assert_eq!(board_result(head, body), Err(DecodeError::Version(version)));
-                assert_eq!(command_result(head, body), Err(DecodeError::Version(version)));
+                assert_eq!(command_result(head, body), Err(DecodeError::Version(version)), "a board obeys its own");
+                if !(OLDEST..=VERSION).contains(&version) {
+                    assert_eq!(board_result(head, body), Err(DecodeError::Version(version)));
+                }
             }
         }
     }
@@ -37,8 +40,69 @@ fn another_version_is_named_whatever_the_kind_and_the_body() {
 }
 
 #[test]
+fn of_the_version_before_a_host_takes_all_but_coded_frames() {
+    let of = |version: u8, message: &BoardMessage| {
+        let stuffed = board_wire(message);
+        let packet = cobs::decode_vec(&stuffed[..stuffed.len() - 1]).unwrap();
+        board_result(version << 4 | packet[0] & 15, &packet[1..packet.len() - 4])
+    };
+    let frame =
+        Frame { head: FrameHead::default(), scope: Scope::whole(4).unwrap(), readings: [7; 16].into_iter().collect() };
+    let messages =
+        [BoardMessage::Hello(hello()), BoardMessage::Frame(frame.clone()), BoardMessage::Fault(Fault::AdcStuck)];
+    for message in &messages {
+        assert_eq!(of(OLDEST, message).as_ref(), Ok(message));
+    }
+    let key = board_wire(&BoardMessage::Frame(frame));
+    // One that is like the frame before it.
+    let coded = [1, 0, 0, 0, 0, 0, 0, 0, 1, 4, 0, 0, 0];
+    for version in OLDEST..=VERSION {
+        let result = receive_board(&[&key, &packet(version << 4 | 4, &coded)]).0.remove(1);
+        assert_eq!(result.is_ok(), version == VERSION, "{result:?}");
+    }
+    // A board of that version that obeys no host of this one is told by its version.
+    let refusal = BoardMessage::Fault(Fault::UnknownVersion(VERSION));
+    assert_eq!(of(OLDEST, &refusal), Err(DecodeError::Version(OLDEST)));
+    assert_eq!(of(VERSION, &refusal), Ok(refusal));
+}
+
+/// Every count with every length of a body, every byte of flags, and every number of a contact.
+#[test]
+fn contacts_are_as_many_as_are_counted_and_have_numbers() {
+    let body = |last: u8, ids: &[u8]| {
+        let contacts = ids.iter().flat_map(|id| [*id, 1, 2, 3, 4, 5, 6, 7]);
+        [9, 0, 1, 2, 3, 4, 0, last].into_iter().chain(contacts).collect::<Vec<u8>>()
+    };
+    for last in 0..=255 {
+        let whole = body(last, &[1, 255, 8, 9, 10]);
+        for length in 0..whole.len() {
+            let result = board_result(CONTACTS, &whole[..length]);
+            if length != 8 + 8 * usize::from(last & 3) {
+                assert_eq!(result, Err(DecodeError::Body), "{last:#x} and {length} bytes");
+                continue;
+            }
+            let Ok(BoardMessage::Contacts(contacts)) = result else { panic!("{last:#x}: {result:?}") };
+            assert_eq!(
+                contacts.found.iter().map(|contact| contact.id).collect::<Vec<_>>(),
+                whole[8..].iter().step_by(8).take(contacts.found.len()).copied().collect::<Vec<_>>()
+            );
+            assert_eq!((contacts.head.sequence, contacts.head.fraction_bits), (9, 0));
+            let sent = board_wire(&BoardMessage::Contacts(contacts));
+            assert_eq!(sent, packet(CONTACTS, &whole[..length]), "it goes out as it came");
+        }
+    }
+    for ids in [&[0][..], &[0, 1], &[1, 0], &[3, 2, 0]] {
+        assert_eq!(board_result(CONTACTS, &body(ids.len() as u8, ids)), Err(DecodeError::Body));
+        let found = ids.iter().map(|id| ContactCode { id: *id, ..ContactCode::default() }).collect();
+        let contacts = Contacts { head: FrameHead::default(), flags: ContactFlags::default(), found };
+        let sent = encode_board(&BoardMessage::Contacts(contacts), &mut [0; MAX_WIRE]);
+        assert_eq!(sent, Err(EncodeError::ContactNumber));
+    }
+}
+
+#[test]
 fn an_unknown_kind_and_the_wrong_direction_are_refused() {
-    for kind in 5..16 {
+    for kind in 4..16 {
         assert_eq!(board_result(VERSION << 4 | kind, &[]), Err(DecodeError::Body));
     }
     for kind in (0..16).filter(|kind| *kind != COMMAND & 15) {
@@ -132,7 +196,7 @@ fn a_packet_that_takes_a_byte_more_than_the_limit_is_junk() {
     assert_eq!(receive_command(&longest).0, [Ok(Request { tag: 255, command: Command::Scan(plan) })]);
     let longer = packet(COMMAND, &scan(&[0xE0, 0]));
     assert_eq!(longer.len(), MAX_COMMAND + 1);
-    let expected = Counters { messages: 0, without_key: 0, corrupt: 1, dropped_bytes: MAX_COMMAND as u64 };
+    let expected = Counters { corrupt: 1, dropped_bytes: MAX_COMMAND as u64, ..Counters::default() };
     assert_eq!(receive_command(&longer), (vec![Err(DecodeError::Corrupt)], expected));
     // In any chunks.
     for cut in 1..longer.len() {
@@ -330,7 +394,7 @@ fn a_flood_without_zeros_is_counted_and_forgotten() {
     let chunks: Vec<&[u8]> = [&flood[..]; 1000].into_iter().chain([&[0][..], &message]).collect();
     let (received, counters) = receive_board(&chunks);
     assert_eq!(received, [Err(DecodeError::Corrupt), Ok(BoardMessage::Hello(hello()))]);
-    assert_eq!(counters, Counters { messages: 1, without_key: 0, corrupt: 1, dropped_bytes: 1_000_000 });
+    assert_eq!(counters, Counters { messages: 1, corrupt: 1, dropped_bytes: 1_000_000, ..Counters::default() });
 }
 
 /// A whole packet of which the receiver's room holds all but the last bytes: what it held, and what it holds next, are not taken for it.
@@ -348,6 +412,6 @@ fn a_stretch_that_is_too_long_is_junk_though_its_beginning_is_a_packet() {
         received.extend(std::iter::from_fn(|| receiver.receive(&mut chunk)));
     }
     assert_eq!(received, [Err(DecodeError::Corrupt), Ok(request)]);
-    let expected = Counters { messages: 1, without_key: 0, corrupt: 1, dropped_bytes: stream.len() as u64 };
+    let expected = Counters { messages: 1, corrupt: 1, dropped_bytes: stream.len() as u64, ..Counters::default() };
     assert_eq!(receiver.counters(), expected);
 }

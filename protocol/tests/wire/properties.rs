@@ -2,9 +2,11 @@
 
 use proptest::prelude::*;
 use proptest::sample::Index;
-use tactomo_protocol::{Counters, EncodeError, MAX_COMMAND, encode_board, encode_request};
+use tactomo_protocol::{
+    BoardMessage, Counters, DecodeError, EncodeError, MAX_COMMAND, MAX_WIRE, encode_board, encode_request,
+};
 
-use crate::common::{board_message, board_wire, receive_board, receive_command, request, request_wire};
+use crate::common::{board_message, board_wire, packet, receive_board, receive_command, request, request_wire};
 
 /// One disturbance of a stream.
 #[derive(Clone, Debug)]
@@ -69,14 +71,35 @@ fn disturbance() -> impl Strategy<Value = Disturbance> {
     ]
 }
 
+/// The last frame and the last contacts: a scan that comes once more is no other.
+#[derive(Default)]
+struct Last([Option<(u16, u32)>; 2]);
+
+impl Last {
+    fn is_again(&mut self, message: &BoardMessage) -> bool {
+        let (last, head) = match message {
+            BoardMessage::Frame(frame) => (&mut self.0[0], &frame.head),
+            BoardMessage::Contacts(contacts) => (&mut self.0[1], &contacts.head),
+            BoardMessage::Hello(hello) if hello.answers == 0 => {
+                *self = Self::default();
+                return false;
+            }
+            _ => return false,
+        };
+        let scan = Some((head.sequence, head.time_us));
+        std::mem::replace(last, scan) == scan
+    }
+}
+
 /// Which of `sent` arrived whole, and what the rest is counted as. A plain reading of the framing rule: whatever stands
 /// between two zeros is a packet that was sent, byte for byte, or junk.
-fn whole<M: Clone>(sent: &[(M, Vec<u8>)], stream: &[u8]) -> (Vec<M>, Counters) {
+fn whole<M: Clone>(sent: &[(M, Vec<u8>)], stream: &[u8], mut is_again: impl FnMut(&M) -> bool) -> (Vec<M>, Counters) {
     let (mut arrived, mut counters) = (Vec::new(), Counters::default());
     let mut stretches: Vec<&[u8]> = stream.split(|byte| *byte == 0).collect();
     stretches.pop(); // Still open.
     for stretch in stretches.into_iter().filter(|stretch| !stretch.is_empty()) {
         match sent.iter().find(|(_, wire)| wire[..wire.len() - 1] == *stretch) {
+            Some((message, _)) if is_again(message) => counters.repeated += 1,
             Some((message, _)) => {
                 arrived.push(message.clone());
                 counters.messages += 1;
@@ -105,6 +128,50 @@ proptest! {
         let wire = request_wire(&request);
         prop_assert!(wire.len() <= MAX_COMMAND);
         prop_assert_eq!(receive_command(&wire).0, [Ok(request)]);
+    }
+
+    /// However often each packet comes.
+    #[test]
+    fn a_packet_that_comes_again_at_once_is_no_other_scan(
+        messages in prop::collection::vec((board_message(), 1..4usize), 1..8),
+    ) {
+        let copies = |(message, count): &(BoardMessage, usize)| board_wire(message).repeat(*count);
+        let stream: Vec<u8> = messages.iter().flat_map(copies).collect();
+        let is_scan = |message: &BoardMessage| matches!(message, BoardMessage::Frame(_) | BoardMessage::Contacts(_));
+        let kept = |(message, count): &(BoardMessage, usize)| vec![message.clone(); if is_scan(message) { 1 } else { *count }];
+        let (received, counters) = receive_board(&[&stream]);
+        let repeated: usize = messages.iter().filter(|(message, _)| is_scan(message)).map(|(_, count)| count - 1).sum();
+        prop_assert_eq!((counters.repeated, counters.corrupt), (repeated as u64, 0));
+        let expected: Vec<_> = messages.iter().flat_map(kept).collect();
+        prop_assert_eq!(received.into_iter().flatten().collect::<Vec<_>>(), expected);
+    }
+
+    /// A frame or contacts with any bits changed, under a right checksum: refused, or what goes out again just so.
+    #[test]
+    fn whatever_is_taken_goes_out_as_it_came(
+        message in board_message(),
+        flips in prop::collection::vec((any::<Index>(), 0..8u8), 0..3),
+        length in prop_oneof![4 => Just(0isize), 1 => -3..=3isize],
+    ) {
+        let wire = board_wire(&message);
+        let sent = cobs::decode_vec(&wire[..wire.len() - 1]).unwrap();
+        let (head, mut body) = (sent[0], sent[1..sent.len() - 4].to_vec());
+        body.resize(body.len().saturating_add_signed(length), 0);
+        for (at, bit) in flips {
+            let at = at.index(body.len().max(1));
+            body.get_mut(at).into_iter().for_each(|byte| *byte ^= 1 << bit);
+        }
+        let came = packet(head, &body);
+        match &receive_board(&[&came]).0[..] {
+            [Ok(taken @ (BoardMessage::Frame(_) | BoardMessage::Contacts(_)))] => {
+                // Reserved bits of the status are ignored.
+                body[6] &= 0xF3;
+                prop_assert_eq!(board_wire(taken), packet(head, &body));
+            }
+            [Ok(taken)] => prop_assert_eq!(receive_board(&[&board_wire(taken)]).0, [Ok(taken.clone())]),
+            [Err(DecodeError::Body)] => {}
+            other => prop_assert!(came.len() > MAX_WIRE, "{other:?}"),
+        }
     }
 
     #[test]
@@ -141,7 +208,8 @@ proptest! {
         let sent: Vec<_> = messages.into_iter().map(|message| (message.clone(), board_wire(&message))).collect();
         let mut stream: Vec<u8> = sent.iter().flat_map(|(_, wire)| wire.clone()).collect();
         disturbances.iter().for_each(|disturbance| disturbance.apply(&mut stream));
-        let (arrived, expected) = whole(&sent, &stream);
+        let mut last = Last::default();
+        let (arrived, expected) = whole(&sent, &stream, |message| last.is_again(message));
         let (received, counters) = receive_board(&[&stream]);
         prop_assert_eq!(received.into_iter().flatten().collect::<Vec<_>>(), arrived);
         prop_assert_eq!(counters, expected);
@@ -155,7 +223,7 @@ proptest! {
         let sent: Vec<_> = requests.into_iter().map(|request| (request.clone(), request_wire(&request))).collect();
         let mut stream: Vec<u8> = sent.iter().flat_map(|(_, wire)| wire.clone()).collect();
         disturbances.iter().for_each(|disturbance| disturbance.apply(&mut stream));
-        let (arrived, expected) = whole(&sent, &stream);
+        let (arrived, expected) = whole(&sent, &stream, |_| false);
         let (received, counters) = receive_command(&stream);
         prop_assert_eq!(received.into_iter().flatten().collect::<Vec<_>>(), arrived);
         prop_assert_eq!(counters, expected);

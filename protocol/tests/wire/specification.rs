@@ -37,21 +37,21 @@ fn frame(head: FrameHead, scope: Option<Scope>, readings: &[u16]) -> BoardMessag
 
 /// One of every kind of message, and the edges of a frame's coding.
 fn board_messages() -> Vec<BoardMessage> {
-    let head = FrameHead { sequence: 513, time_us: 67_305_985, status: Status(0), folded: 0, fraction_bits: 0 };
-    let mut timed_out = FrameHead { sequence: 65535, folded: 2, fraction_bits: 4, ..head };
+    let numbered = |sequence| FrameHead { sequence, time_us: 67_305_985, ..FrameHead::default() };
+    let mut timed_out = FrameHead { folded: 2, fraction_bits: 4, ..numbered(65_535) };
     timed_out.status.insert(Status::SATURATED);
     timed_out.status.insert(Status::TIMED_OUT);
     vec![
         BoardMessage::Hello(hello()),
-        frame(head, Scope::whole(4), &[0, 1, 2, 3, 4, 0, 6, 7, 8, 9, 0, 11, 12, 13, 14, 0]),
+        frame(numbered(513), Scope::whole(4), &[0, 1, 2, 3, 4, 0, 6, 7, 8, 9, 0, 11, 12, 13, 14, 0]),
         frame(
-            head,
+            numbered(514),
             Scope::whole(5),
             &std::array::from_fn::<u16, 25, _>(|i| if i % 6 == 0 { 0 } else { 150 * i as u16 }),
         ),
         frame(timed_out, Scope::whole(4), &[65535, 256, 0, 1, 255, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
-        frame(head, Scope::whole(4), &[0; 16]),
-        frame(head, Scope::of_rows(16, &[12, 0, 12], 0b1001_0000_0000_0001), &[3, 0, 450, 0, 7, 440, 2, 0, 451]),
+        frame(numbered(0), Scope::whole(4), &[0; 16]),
+        frame(numbered(1), Scope::of_rows(16, &[12, 0, 12], 0b1001_0000_0000_0001), &[3, 0, 450, 0, 7, 440, 2, 0, 451]),
         BoardMessage::Log(Log(Fixed::from_slice(&[0xFF, 0x00, 0x12, 0x00]).unwrap())),
         BoardMessage::Fault(Fault::Panic("src/main.rs:42".try_into().unwrap())),
         BoardMessage::Fault(Fault::Reset("watchdog".try_into().unwrap())),
@@ -63,7 +63,7 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Clock(Clock { answers: 7, time_us: 67_305_985 }),
         BoardMessage::Fault(Fault::NoTable { answers: 14 }),
         BoardMessage::Fault(Fault::BrokenWires { electrodes: 1 << 5 | 1 << 12 }),
-        contacts(head),
+        contacts(numbered(513)),
         BoardMessage::Table(TableState { answers: 15, room: 0, held: 0, usable: None }),
         BoardMessage::Table(TableState {
             answers: 15,

@@ -212,8 +212,8 @@ fn a_board_that_is_a_touch_screen_tells_a_press_and_its_end_by_itself() -> Resul
     };
     let size_m = [size_m("width um: ")?, size_m("height um: ")?];
     let (last, touching) = reports.split_last().context("no report")?;
-    // It lands in the first of 20 frames, which does not tell it, and stays in the one in which it lifts.
-    ensure!(touching.len() == 20, "{printed}");
+    // It lands in the first of 20 frames, is searched while some go by, and stays in the one in which it lifts.
+    ensure!((14..=20).contains(&touching.len()), "{printed}");
     for report in &reports {
         let is_last = std::ptr::eq(report, last);
         ensure!(report.len() == REPORT_BYTES && report[0] == TOUCH_ID && report[REPORT_BYTES - 1] == 1, "{report:?}");

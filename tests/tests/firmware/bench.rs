@@ -10,10 +10,10 @@ use tactomo::detector::Detector;
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
 use tactomo::simulate::{self, Physics, Simulation};
 use tactomo::solve::{Problem, compile};
-use tactomo_firmware::{ContactFinder, Mux, RamStore, TimedOut, Touch};
+use tactomo_firmware::{ContactFinder, Identity, Mux, RamStore, TimedOut, Touch};
 use tactomo_protocol::{BoardMessage, Command, Contacts, Fault, MAX_PIECE, TablePiece, TableState};
 
-use crate::parts::{Outside, TestBoard, board_with, step};
+use crate::parts::{IDENTITY, Outside, TestBoard, board_of, step};
 
 /// Room for a table (bytes).
 pub const ROOM: usize = 128 * 1024;
@@ -26,12 +26,18 @@ pub type Finder = ContactFinder<RamStore<Vec<u8>>, 256>;
 
 /// One whose memory has these bytes.
 pub fn finder(memory: Vec<u8>) -> Finder {
-    ContactFinder::new(RamStore::new(memory))
+    let other = vec![0; memory.len()];
+    ContactFinder::new(RamStore::new([memory, other]))
 }
 
 /// Memory with the detector's table.
 pub fn table_memory() -> Vec<u8> {
-    let mut memory = TABLE.to_vec();
+    memory_of(&TABLE)
+}
+
+/// Memory with a table.
+pub fn memory_of(table: &[u8]) -> Vec<u8> {
+    let mut memory = table.to_vec();
     memory.resize(ROOM, 0);
     memory
 }
@@ -63,21 +69,28 @@ pub struct Bench<T> {
     volts: Rc<RefCell<Vec<f64>>>,
     pub outside: Outside,
     tag: u8,
+    electrodes: usize,
 }
 
 impl<T: Touch> Bench<T> {
     pub fn new(touch: T) -> Self {
-        let (outside, volts) = (Outside::default(), Rc::new(RefCell::new(vec![0.0; 256])));
+        Self::of(touch, IDENTITY, 0.0)
+    }
+
+    /// A board of this identity, whose ground is lifted by so much (V), and whose converter reads nothing below its floor.
+    pub fn of(touch: T, identity: Identity, ground_v: f64) -> Self {
+        let electrodes = usize::from(identity.electrodes);
+        let (outside, volts) = (Outside::default(), Rc::new(RefCell::new(vec![0.0; electrodes * electrodes])));
         let (mux, read) = (KnownGround::default(), Rc::clone(&volts));
-        let ground = mux.clone();
+        let (ground, floor) = (mux.clone(), f64::from(identity.adc.ranges[0].floor));
         let sample: Sample = Box::new(move |number, electrode| {
-            let volts: f64 = read.borrow()[16 * usize::from(ground.0.get()) + usize::from(electrode)];
+            let volts: f64 = read.borrow()[electrodes * usize::from(ground.0.get()) + usize::from(electrode)];
             // Noise of half a code, as a converter of little has.
             let noise = ((number.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f64 / f64::from(1 << 24)) - 0.5;
-            Ok((volts / 3.3 * 4096.0 + 0.5 + noise).max(0.0) as u16)
+            Ok(((volts + ground_v) / 3.3 * 4096.0 + 0.5 + noise).max(floor) as u16)
         });
-        let board = board_with(&outside, mux, sample, NoopDelay::new(), touch);
-        Self { board, volts, outside, tag: 0 }
+        let board = board_of(&outside, mux, sample, NoopDelay::new(), touch, identity);
+        Self { board, volts, outside, tag: 0, electrodes }
     }
 
     pub fn command(&mut self, command: Command) -> Vec<BoardMessage> {
@@ -115,7 +128,7 @@ impl<T: Touch> Bench<T> {
     /// Scans so many frames of this; the contacts that are sent.
     pub fn scan(&mut self, simulation: &mut Simulation, frames: usize) -> Vec<Contacts> {
         self.read(simulation);
-        step(&mut self.board, 16 * frames);
+        step(&mut self.board, self.electrodes * frames);
         let contacts = |message| match message {
             BoardMessage::Contacts(contacts) => Some(contacts),
             _ => None,
@@ -134,8 +147,13 @@ pub fn faulty_simulation(contacts: &[Contact], fault: &str) -> Simulation {
 }
 
 fn simulated(contacts: &[Contact], faults: &[simulate::Fault]) -> Simulation {
-    let scene = Scene::new(SceneName::Rest, &DETECTOR, Hand::relative(&DETECTOR), 1);
-    let simulation = Simulation::new(&DETECTOR, scene, faults, 1).unwrap();
+    simulated_on(&DETECTOR, contacts, faults)
+}
+
+/// On any detector.
+pub fn simulated_on(detector: &Detector, contacts: &[Contact], faults: &[simulate::Fault]) -> Simulation {
+    let scene = Scene::new(SceneName::Rest, detector, Hand::relative(detector), 1);
+    let simulation = Simulation::new(detector, scene, faults, 1).unwrap();
     simulation.controls().press(contacts.to_vec());
     simulation
 }

@@ -1,13 +1,18 @@
 //! Contacts that a board finds by itself, and the table that it finds them by.
 
+use std::sync::LazyLock;
+
 use tactomo::detector::Detector;
 use tactomo::solve::{Problem, compile};
+use tactomo_firmware::Identity;
 use tactomo_protocol::{
-    BoardMessage, Command, ContactFlags, Contacts, Fault, MAX_PIECE, Output, TablePiece, TableState,
+    BoardMessage, Command, ContactFlags, Contacts, Fault, MAX_PIECE, Output, Range, TablePiece, TableState,
 };
 
-use crate::bench::{Bench, DETECTOR, ROOM, TABLE, faulty_simulation, finder, finger, simulation, table_memory};
-use crate::parts::{Outside, simple_board, step};
+use crate::bench::{
+    Bench, DETECTOR, ROOM, TABLE, faulty_simulation, finder, finger, memory_of, simulated_on, simulation, table_memory,
+};
+use crate::parts::{IDENTITY, Outside, simple_board, step};
 
 #[test]
 fn contacts_are_where_something_presses_and_follow_a_rest_that_is_known() {
@@ -24,7 +29,10 @@ fn contacts_are_where_something_presses_and_follow_a_rest_that_is_known() {
     assert!((off_m[0] - place_m[0]).hypot(off_m[1] - place_m[1]) < 3e-4, "{contact:?}");
     assert!(contact.sigma_m().is_some_and(|sigma_m| sigma_m < 1e-3), "{contact:?}");
     assert_eq!(pressed[19].flags, ContactFlags::default());
-    assert!(pressed[1..].iter().all(|contacts| contacts.found.first().is_some_and(|first| first.id == contact.id)));
+    // It lands in the first, and is searched from the second on, while frames go on: with misfit until it is found.
+    let found = pressed.iter().position(|contacts| !contacts.found.is_empty()).unwrap();
+    assert!(found < 8 && pressed[..found].iter().all(|contacts| contacts.flags.has(ContactFlags::MISFIT)), "{found}");
+    assert!(pressed[found..].iter().all(|contacts| contacts.found.first().is_some_and(|first| first.id == contact.id)));
     let sequences: Vec<_> = pressed.iter().map(|contacts| contacts.head.sequence).collect();
     assert!(sequences.windows(2).all(|two| two[1] == two[0] + 1));
 }
@@ -38,10 +46,38 @@ fn a_press_in_the_first_frame_is_told_and_rest_is_learned_when_it_goes() {
     bench.command(Command::Start);
     let pressed = bench.scan(&mut pressing, 200);
     let is_told = |contacts: &Contacts| contacts.found.len() == 1 && contacts.flags.has(ContactFlags::RESTING);
-    assert_eq!(pressed.iter().position(|contacts| !is_told(contacts)), None, "{:?}", pressed.first());
+    // But for those that come while it is searched.
+    assert_eq!(pressed[8..].iter().position(|contacts| !is_told(contacts)), None, "{:?}", pressed.first());
     let after = bench.scan(&mut simulation(&[]), 100);
     let last = &after[99];
     assert!(last.found.is_empty() && !last.flags.has(ContactFlags::RESTING), "{last:?}");
+}
+
+/// A search takes many frames. Each command is obeyed between two rows.
+#[test]
+fn commands_are_obeyed_and_frames_go_on_while_a_search_is_under_way() {
+    let mut bench = Bench::new(finder(table_memory()));
+    bench.command(Command::Output(Output::Contacts));
+    bench.command(Command::Start);
+    bench.scan(&mut simulation(&[]), 80);
+    let three = [[0.011, -0.007], [-0.014, 0.009], [0.002, 0.019]].map(finger);
+    // Landing; then the search begins.
+    let begun = bench.scan(&mut simulation(&three), 3);
+    assert!(begun.iter().all(|contacts| contacts.flags.has(ContactFlags::MISFIT)), "{begun:?}");
+    // A row later there is an answer.
+    let answers = bench.command(Command::Hello);
+    assert!(answers.iter().any(|message| matches!(message, BoardMessage::Hello(_))), "{answers:?}");
+    let sequences: Vec<_> = begun.iter().map(|contacts| contacts.head.sequence).collect();
+    assert!(sequences.windows(2).all(|two| two[1] == two[0] + 1), "{sequences:?}");
+    let found = bench.scan(&mut simulation(&three), 40);
+    let last = &found[found.len() - 1];
+    assert!(last.found.len() == 3 && !last.flags.has(ContactFlags::MISFIT), "{last:?}");
+    // One that is stopped is given up.
+    bench.scan(&mut simulation(&[finger([0.0, 0.01])]), 2);
+    let stopped = bench.command(Command::Stop);
+    assert!(stopped.iter().any(|m| matches!(m, BoardMessage::Hello(hello) if !hello.is_streaming)), "{stopped:?}");
+    bench.command(Command::Start);
+    assert!(bench.scan(&mut simulation(&[]), 4).iter().all(|contacts| contacts.found.is_empty()));
 }
 
 #[test]
@@ -120,10 +156,21 @@ fn without_a_table_contacts_are_refused_and_one_that_comes_in_pieces_is_used() {
     bench.command(Command::Output(Output::Contacts));
     bench.command(Command::Start);
     assert_eq!(bench.scan(&mut simulation(&[]), 4).len(), 4);
-    // A new table ends the contacts of the old one.
-    assert_eq!(bench.piece(0, &TABLE[..64]).0.usable, None);
+    // Contacts go on by the old one until a new one is whole, and are then to be asked for anew.
+    for (number, bytes) in OTHER.chunks(MAX_PIECE).enumerate() {
+        assert_eq!(bench.piece(number * MAX_PIECE, bytes).0.usable.is_some(), (number + 1) * MAX_PIECE >= OTHER.len());
+        if number % 400 == 0 {
+            assert_eq!(bench.scan(&mut simulation(&[]), 4).len(), 4);
+        }
+    }
     assert_eq!(bench.scan(&mut simulation(&[]), 4), []);
 }
+
+/// The detector's own, but for a drive that is a little lower.
+static OTHER: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let detector = Detector { drive_v: 1.99, ..DETECTOR.clone() };
+    compile(&Problem::of(&detector).unwrap()).unwrap()
+});
 
 #[test]
 fn tables_that_are_damaged_or_of_another_detector_are_refused() {
@@ -141,6 +188,50 @@ fn tables_that_are_damaged_or_of_another_detector_are_refused() {
             assert_eq!(state.usable, None);
         }
         assert!(was_refused);
+    }
+}
+
+/// Other electrode counts, a ground that is lifted, and a converter that sees nothing below a floor: with the ground above it a light press is read, and what
+/// is at the floor is no voltage, nor a rest.
+#[test]
+fn boards_of_any_electrodes_grounds_and_floors_find_what_presses_where_it_is() {
+    let floor_mv = 142u16;
+    let floor = Range { floor: (f64::from(floor_mv) / 3300.0 * 4096.0) as u16, ..Range::of_codes(16, 12) };
+    let floored = IDENTITY.adc.with_ranges(&[floor]);
+    let place_m = [0.008, -0.006];
+    // Electrodes that are left out, how far the ground is lifted, and the converter.
+    for (left_out, ground_v, adc) in [
+        (&[][..], 0.25, IDENTITY.adc),
+        (&[], 0.25, floored),
+        (&[], 0.0, floored),
+        (&[0, 5, 10, 15], 0.0, IDENTITY.adc),
+        (&[1, 2, 7, 8, 11, 13, 14], 0.25, floored),
+    ] {
+        let mut detector = DETECTOR.clone();
+        let mut number = 0;
+        detector.electrodes.retain(|_| {
+            number += 1;
+            !left_out.contains(&(number - 1))
+        });
+        let electrodes = detector.electrodes.len() as u8;
+        let drive_mv = 2000 + (1000.0 * ground_v) as u16;
+        let identity = Identity { electrodes, adc, drive_mv, ..IDENTITY };
+        let table = compile(&Problem::of(&detector).unwrap()).unwrap();
+        let mut bench = Bench::of(finder(memory_of(&table)), identity, ground_v);
+        bench.command(Command::Output(Output::Contacts));
+        bench.command(Command::Start);
+        let described = format!("{electrodes} electrodes, {ground_v} V, {:?}", adc.ranges[0]);
+        let resting = bench.scan(&mut simulated_on(&detector, &[], &[]), 80);
+        assert!(resting.iter().all(|contacts| contacts.found.is_empty()), "{described}");
+        assert!(!resting.last().unwrap().flags.has(ContactFlags::RESTING), "{described}");
+        let pressed = bench.scan(&mut simulated_on(&detector, &[finger(place_m)], &[]), 12);
+        let [contact] = pressed.last().unwrap().found[..] else { panic!("{described}: {:?}", pressed.last()) };
+        let off_m = contact.at_m().map(f64::from);
+        assert!((off_m[0] - place_m[0]).hypot(off_m[1] - place_m[1]) < 5e-4, "{described}: {contact:?}");
+        let after = bench.scan(&mut simulated_on(&detector, &[], &[]), 6);
+        // Where all readings are at the floor, none tells that a light contact has gone.
+        let is_seen = ground_v > 0.0 || adc.ranges[0].floor == 0;
+        assert!(!is_seen || after.last().unwrap().found.is_empty(), "{described}: {:?}", after.last());
     }
 }
 

@@ -8,13 +8,15 @@ use proptest::sample::select;
 use tactomo::detector::Detector;
 use tactomo::solve::{Problem, compile};
 use tactomo_firmware::{ContactFinder, FlashStore, RamCopy, TableStore, Touch, View};
-use tactomo_protocol::{Hello, MAX_PIECE, Settings, TablePiece, TableState};
+use tactomo_protocol::{Hello, MAX_PIECE, Output, Settings, TablePiece, TableState};
 
 use crate::nor_flash::{Chip, Trouble};
 
-/// Room for a table (bytes), and where it begins.
+/// Room for a table (bytes), and where the two places begin: one behind the other.
 const ROOM: usize = 128 * 1024;
-const BASE: usize = 2 * ROOM;
+const BASES: [usize; 2] = [2 * ROOM, ROOM];
+/// What lies before and behind them.
+const END: usize = 3 * ROOM;
 
 static FIRST: LazyLock<Vec<u8>> = LazyLock::new(|| table_of("square-60"));
 static SECOND: LazyLock<Vec<u8>> = LazyLock::new(|| table_of("square-150"));
@@ -35,27 +37,24 @@ fn table_of(preset: &str) -> Vec<u8> {
 /// Both ways to see flash.
 enum Seen {
     Copied(RamCopy<Vec<u8>>),
-    Mapped { length: usize },
+    Mapped { base: usize, length: usize },
 }
 
 impl<'f, const WORD: usize, const SECTOR: usize> View<&'f mut Chip<WORD, SECTOR>> for Seen {
     fn bytes<'a>(&'a self, flash: &'a &'f mut Chip<WORD, SECTOR>) -> &'a [u8] {
         match self {
             Self::Copied(copy) => copy.bytes(flash),
-            Self::Mapped { length } => &flash.bytes[BASE..BASE + length],
+            Self::Mapped { base, length } => &flash.bytes[*base..base + length],
         }
     }
 
-    fn open(&mut self, flash: &mut &'f mut Chip<WORD, SECTOR>, base: u32) -> bool {
+    fn open(&mut self, flash: &mut &'f mut Chip<WORD, SECTOR>, at: u32) -> bool {
         match self {
-            Self::Copied(copy) => copy.open(flash, base),
-            Self::Mapped { .. } => true,
-        }
-    }
-
-    fn put(&mut self, at: usize, bytes: &[u8]) {
-        if let Self::Copied(copy) = self {
-            <RamCopy<_> as View<&mut Chip<WORD, SECTOR>>>::put(copy, at, bytes);
+            Self::Copied(copy) => copy.open(flash, at),
+            Self::Mapped { base, .. } => {
+                *base = at as usize;
+                true
+            }
         }
     }
 }
@@ -67,9 +66,11 @@ fn store<const WORD: usize, const SECTOR: usize>(
     chip: &mut Chip<WORD, SECTOR>,
     length: usize,
 ) -> FlashStore<&mut Chip<WORD, SECTOR>, Seen> {
-    // Only bytes can be read where they lie while a table comes.
-    let seen = if WORD == 1 { Seen::Mapped { length } } else { Seen::Copied(RamCopy::new(vec![0; length])) };
-    FlashStore::new(chip, seen, BASE as u32)
+    let seen = match WORD {
+        1 => Seen::Mapped { base: BASES[0], length },
+        _ => Seen::Copied(RamCopy::new(vec![0; length])),
+    };
+    FlashStore::new(chip, seen, BASES.map(|base| base as u32))
 }
 
 /// A board of this flash, after a reset.
@@ -127,8 +128,8 @@ fn whole() -> usize {
 
 /// A table is kept, wears each of its sectors once, a second time none, and gives way to others.
 fn tables_come_and_stay<const WORD: usize, const SECTOR: usize>() {
-    let mut chip = Chip::<WORD, SECTOR>::new(BASE + ROOM + SECTOR, 1);
-    let around = |chip: &Chip<WORD, SECTOR>| [chip.bytes[..BASE].to_vec(), chip.bytes[BASE + ROOM..].to_vec()];
+    let mut chip = Chip::<WORD, SECTOR>::new(END + SECTOR, 1);
+    let around = |chip: &Chip<WORD, SECTOR>| [chip.bytes[..BASES[1]].to_vec(), chip.bytes[END..].to_vec()];
     let before = around(&chip);
     assert_eq!(usable(&reset(&mut chip)), None);
 
@@ -138,7 +139,8 @@ fn tables_come_and_stay<const WORD: usize, const SECTOR: usize>() {
     assert_eq!(send(&mut finder, &FIRST, whole), Some(1));
     assert_eq!(usable(&reset(&mut chip)), checksum(&FIRST));
     let sectors = FIRST.len().div_ceil(SECTOR);
-    assert_eq!(chip.erased(BASE), [vec![1; sectors], vec![0; ROOM / SECTOR - sectors]].concat());
+    let worn = [vec![1; sectors], vec![0; ROOM / SECTOR - sectors]].concat();
+    assert_eq!(BASES.map(|base| chip.erased(base)), [worn, vec![0; ROOM / SECTOR]]);
 
     let operations = chip.operations;
     assert_eq!(send(&mut reset(&mut chip), &FIRST, whole), Some(1));
@@ -149,7 +151,7 @@ fn tables_come_and_stay<const WORD: usize, const SECTOR: usize>() {
         assert_eq!(send(&mut reset(&mut chip), table, whole), Some(begun));
         assert_eq!(usable(&reset(&mut chip)), checksum(table));
     }
-    assert!(around(&chip) == before, "what is around the region has changed");
+    assert!(around(&chip) == before, "what is around the places has changed");
 }
 
 #[test]
@@ -159,9 +161,53 @@ fn tables_come_and_stay_and_wear_little() {
     tables_come_and_stay::<8, 2048>();
 }
 
+/// Whatever is sent: only a table that is whole and sound takes the place of the one before, and only one whose head is of this board wears flash.
+#[test]
+fn a_table_stays_until_another_is_whole_and_sound() {
+    let mut chip = Chip::<4, 4096>::new(END, 5);
+    assert_eq!(send(&mut reset(&mut chip), &FIRST, whole), Some(1));
+    let with = |at: usize, bytes: &[u8]| {
+        let mut table = SECOND.clone();
+        table[at..at + bytes.len()].copy_from_slice(bytes);
+        table
+    };
+    // Another magic, version, count of electrodes and of coefficients, length, and drive.
+    let foreign: [(usize, &[u8]); 6] =
+        [(0, b"X"), (4, &[9]), (6, &[8]), (8, &[200]), (16, &[1, 2, 3, 4]), (24 + 4 * 9, &[0, 0, 0x80, 0x40])];
+    let operations = chip.operations;
+    for (at, bytes) in foreign {
+        assert_eq!(send(&mut reset(&mut chip), &with(at, bytes), whole), None, "byte {at}");
+    }
+    let mut finder = reset(&mut chip);
+    assert!(finder.take(&piece(0, &SECOND[..MAX_PIECE])));
+    assert_eq!(finder.table().usable, None, "while another comes");
+    assert_eq!(chip.operations, operations, "nothing is erased before the head has come");
+
+    let mut finder = reset(&mut chip);
+    assert_eq!(send(&mut finder, &with(50_000, &[1, 2, 3]), whole), None, "a wrong checksum");
+    assert_eq!(usable(&finder), checksum(&FIRST));
+    assert_eq!(usable(&reset(&mut chip)), checksum(&FIRST));
+    assert!(chip.operations > operations);
+    for pieces in [2, 3, 700] {
+        let mut finder = reset(&mut chip);
+        let mut sent = SECOND.chunks(MAX_PIECE).take(pieces).enumerate();
+        assert!(sent.all(|(number, bytes)| finder.take(&piece(number * MAX_PIECE, bytes))));
+        assert!(finder.set_output(Output::Contacts), "contacts by the one before");
+        assert_eq!(usable(&reset(&mut chip)), checksum(&FIRST), "cut off after {pieces} pieces");
+    }
+    // A piece too long for the table, at its end.
+    let mut finder = reset(&mut chip);
+    let mut long = SECOND.clone();
+    long.extend([0; 8]);
+    assert_eq!(send(&mut finder, &long, whole), None);
+    assert_eq!(usable(&finder), checksum(&FIRST));
+    assert_eq!(send(&mut finder, &SECOND, whole), Some(1));
+    assert_eq!(usable(&reset(&mut chip)), checksum(&SECOND));
+}
+
 #[test]
 fn a_table_too_long_and_a_region_that_is_none_are_refused() {
-    let mut chip = Chip::<4, 4096>::new(BASE + ROOM, 2);
+    let mut chip = Chip::<4, 4096>::new(END, 2);
     for (length, room) in [(ROOM, ROOM), (64 * 1024, 64 * 1024), (ROOM + 4096, 0), (4096 + 64, 0), (0, 0)] {
         let mut finder = ContactFinder::<_, 256>::new(store(&mut chip, length));
         assert_eq!(finder.table().room as usize, room);
@@ -170,9 +216,13 @@ fn a_table_too_long_and_a_region_that_is_none_are_refused() {
         }
     }
     let mut store = store(&mut chip, ROOM);
-    assert_eq!(store.write(ROOM - 4, &[1; 8]), None);
-    assert_eq!(store.write(usize::MAX, &[1; 8]), None);
-    assert!(!FlashStore::new(&mut chip, RamCopy::new(vec![0; ROOM]), BASE as u32 + 64).keep(1));
+    assert!(!store.write(ROOM - 4, &[1; 8]) && !store.write(usize::MAX, &[1; 8]));
+    for bases in
+        [[BASES[0], BASES[1] + 64], [BASES[0] + 64, BASES[1]], BASES.map(|_| ROOM), [END, ROOM], [ROOM, ROOM + 4096]]
+    {
+        let mut none = FlashStore::new(&mut chip, RamCopy::new(vec![0; ROOM]), bases.map(|base| base as u32));
+        assert!(none.bytes().is_empty() && !none.write(0, &[1; 8]) && !none.swap(), "{bases:x?}");
+    }
 }
 
 /// What goes wrong in which operation, counted from the first or from the last.
@@ -185,7 +235,7 @@ fn troubled<const WORD: usize, const SECTOR: usize>(
     ((trouble, place), seed): (Plan, u64),
 ) -> Result<(), TestCaseError> {
     let chip_of_old = || {
-        let mut chip = Chip::<WORD, SECTOR>::new(BASE + ROOM, seed);
+        let mut chip = Chip::<WORD, SECTOR>::new(END, seed);
         old.iter().for_each(|old| assert!(send(&mut reset(&mut chip), old, whole).is_some()));
         chip
     };
@@ -212,7 +262,8 @@ fn troubled<const WORD: usize, const SECTOR: usize>(
     prop_assert_eq!(happened, sent.is_none(), "what goes wrong is noticed");
 
     let found = usable(&reset(&mut chip));
-    prop_assert!(found.is_none() || found == checksum(new) || found == old.and_then(checksum), "{found:?}");
+    // The old one is there until the new one is.
+    prop_assert!(found == checksum(new) || found == old.and_then(checksum), "{found:?}");
     if sent.is_some() {
         prop_assert_eq!(found, checksum(new));
     }
@@ -243,13 +294,13 @@ proptest! {
 /// A board in the middle of a table that is asked for another, and for the same again.
 #[test]
 fn a_table_may_be_begun_anew_at_any_place() {
-    let mut chip = Chip::<4, 4096>::new(BASE + ROOM, 3);
+    let mut chip = Chip::<4, 4096>::new(END, 3);
     let mut finder = reset(&mut chip);
     for (table, pieces) in [(&FIRST, 3), (&SECOND, 700), (&SECOND, 20), (&ALIKE, 1200)] {
         for (number, bytes) in table.chunks(MAX_PIECE).take(pieces).enumerate() {
             assert!(finder.take(&piece(number * MAX_PIECE, bytes)));
         }
     }
-    assert_eq!(send(&mut finder, &FIRST, whole), Some(2), "the first 70 000 bytes are those of the one like it");
+    assert_eq!(send(&mut finder, &FIRST, whole), Some(1), "what was begun is in nobody's way");
     assert_eq!(usable(&reset(&mut chip)), checksum(&FIRST));
 }

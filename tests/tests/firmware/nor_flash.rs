@@ -1,6 +1,6 @@
 //! NOR flash that holds its user to its rules, and goes wrong when it is told to.
 
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+use embedded_storage::nor_flash::{ErrorType, MultiwriteNorFlash, NorFlash, NorFlashErrorKind, ReadNorFlash};
 
 /// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,15 +126,17 @@ impl<const WORD: usize, const SECTOR: usize> NorFlash for Chip<WORD, SECTOR> {
         assert!(at.is_multiple_of(WORD) && end.is_multiple_of(WORD));
         assert!(bytes.as_ptr().addr().is_multiple_of(4), "some drivers want words in memory too");
         let blank = &mut self.blank[at / WORD..end / WORD];
-        assert!(self.is_off || blank.iter().all(|blank| *blank), "written twice, or not erased");
+        let clears = bytes.iter().all(|byte| *byte == 0);
+        assert!(self.is_off || clears || blank.iter().all(|blank| *blank), "written twice, or not erased");
         blank.fill(false);
         let was_off = self.is_off;
-        let weak = bytes.iter().position(|byte| *byte != 0xFF);
+        // The first byte of which a bit is to be cleared.
+        let weak = bytes.iter().zip(&self.bytes[at..end]).position(|(byte, place)| place & !byte != 0);
         let trouble = self.trouble(weak.is_some());
         for (number, (place, byte)) in self.bytes[at..end].iter_mut().zip(bytes).enumerate() {
             match trouble {
                 None => *place &= byte,
-                Some(Trouble::Weak) if Some(number) == weak => *place &= byte | 1 << byte.trailing_ones(),
+                Some(Trouble::Weak) if Some(number) == weak => *place &= byte | 1 << (*place & !byte).trailing_zeros(),
                 Some(Trouble::Weak) => *place &= byte,
                 Some(_) if !was_off => *place &= byte | self.random.u8(..),
                 Some(_) => {}
@@ -146,3 +148,6 @@ impl<const WORD: usize, const SECTOR: usize> NorFlash for Chip<WORD, SECTOR> {
         }
     }
 }
+
+/// Words that were written may be cleared.
+impl<const WORD: usize, const SECTOR: usize> MultiwriteNorFlash for Chip<WORD, SECTOR> {}

@@ -239,6 +239,21 @@ pub fn board_with<M: Mux, F, D: DelayNs, T: Touch>(
 where
     F: FnMut(u64, u8) -> Result<u16, TimedOut>,
 {
+    board_of(outside, mux, sample, delay, touch, IDENTITY)
+}
+
+/// The same of another identity.
+pub fn board_of<M: Mux, F, D: DelayNs, T: Touch>(
+    outside: &Outside,
+    mux: M,
+    sample: F,
+    delay: D,
+    touch: T,
+    identity: Identity,
+) -> TestBoard<M, F, D, T>
+where
+    F: FnMut(u64, u8) -> Result<u16, TimedOut>,
+{
     let parts = Parts {
         mux,
         sampler: TestSampler(outside.clone(), sample),
@@ -246,7 +261,7 @@ where
         chip: TestChip(outside.clone(), delay),
         touch,
     };
-    Board16::new(parts, IDENTITY).unwrap()
+    Board16::new(parts, identity).unwrap()
 }
 
 /// A board with no multiplexer and unchecked delays.

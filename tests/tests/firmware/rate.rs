@@ -1,7 +1,8 @@
 //! The rate of the line: set on trial, confirmed, and given up without a host.
 
+use proptest::prelude::*;
 use tactomo_firmware::Activity;
-use tactomo_protocol::{Command, Fault};
+use tactomo_protocol::{BoardMessage, Command, Fault};
 
 use crate::parts::{Outside, faults, frames, hellos, numbered, scan, simple_board, step};
 
@@ -117,4 +118,35 @@ fn a_rate_is_kept_as_long_as_a_host_is_heard_every_two_seconds() {
     while board.step().unwrap() != Activity::Frame {}
     step(&mut board, 1);
     assert!(!frames(&outside.messages()).is_empty(), "the stream goes on");
+}
+
+proptest! {
+    /// However slow the line is, and whatever waits: all of the answer leaves at the old rate, nothing behind it, and no packet is cut.
+    #[test]
+    fn an_answer_has_left_before_the_rate_changes(rooms in prop::collection::vec(0..60usize, 1..40), before in 0..50usize, hellos_before in 0..3) {
+        let outside = outside();
+        let mut board = simple_board(&outside, numbered);
+        outside.send(Command::Start);
+        step(&mut board, 40);
+        outside.messages();
+        outside.set_room(rooms[0]);
+        step(&mut board, before);
+        (0..hellos_before).for_each(|_| outside.send(Command::Hello));
+        outside.send_tagged(5, Command::Rate { baud: 2_000_000 });
+        let mut rooms = rooms.into_iter().cycle();
+        let mut steps = 0;
+        while baud(&outside) == RATES[0] && steps < 3000 {
+            outside.set_room(if steps < 2000 { rooms.next().unwrap() } else { usize::MAX });
+            step(&mut board, 1);
+            steps += 1;
+        }
+        prop_assert_eq!(baud(&outside), 2_000_000);
+        let sent = outside.wire.borrow().sent.len();
+        outside.set_room(usize::MAX);
+        step(&mut board, 40);
+        prop_assert_eq!((&outside.wire.borrow().changes, outside.wire.borrow().sent.len()), (&vec![sent], sent));
+        let messages = outside.messages();
+        let last = messages.last();
+        prop_assert!(matches!(last, Some(BoardMessage::Hello(hello)) if hello.answers == 5), "{:?}", last);
+    }
 }

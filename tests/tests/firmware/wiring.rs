@@ -123,13 +123,23 @@ fn address(text: &str, before: &str) -> u32 {
     u32::from_str_radix(digits.trim_start_matches("0x"), 16).unwrap()
 }
 
+/// The two places of a board's tables, from the end of flash downwards.
+fn places(text: &str, before: &str) -> [u32; 2] {
+    let digits = between(text, before, "];").replace('_', "");
+    let at = |digits: &str| u32::from_str_radix(digits.trim().trim_start_matches("0x"), 16).unwrap();
+    let (first, second) = digits.split_once(',').unwrap();
+    [at(first), at(second)]
+}
+
 #[test]
 fn tables_lie_where_no_image_reaches() {
-    let espressif = address(ESPRESSIF_TABLE, "const TABLE_AT: u32 = ");
-    assert_eq!(espressif, 0x1_0000 + address(IMAGES, "const ESP_FLASH: u64 = "), "behind the longest image");
-    assert!(FIRMWARE_PAGE.contains(&format!("| {espressif:#08X} of the module's flash")));
-    let stm32 = address(STM32_FLASH, "const SECTOR_AT: u32 = ");
-    assert!(IMAGES.contains("0x0800_0000..0x080e_0000") && stm32 == 0xE_0000);
-    assert!(STM32_MEMORY.contains("LENGTH = 1024K - 128K") && stm32 == (1024 - 128) * 1024);
-    assert!(FIRMWARE_PAGE.contains(&format!("| 0x080{:X}, sector 11 |", stm32)));
+    let espressif = places(ESPRESSIF_TABLE, "const TABLES_AT: [u32; 2] = [");
+    assert_eq!(espressif[1], 0x1_0000 + address(IMAGES, "const ESP_FLASH: u64 = "), "behind the longest image");
+    assert!(
+        FIRMWARE_PAGE.contains(&format!("| {:#08X} and {:#08X} of the module's flash", espressif[0], espressif[1]))
+    );
+    let stm32 = places(STM32_FLASH, "const SECTORS_AT: [u32; 2] = [");
+    assert!(IMAGES.contains("0x0800_0000..0x080c_0000") && stm32 == [0xE_0000, 0xC_0000]);
+    assert!(STM32_MEMORY.contains("LENGTH = 1024K - 256K") && stm32[1] == (1024 - 256) * 1024);
+    assert!(FIRMWARE_PAGE.contains(&format!("| 0x080{:X} and 0x080{:X}, sectors 11 and 10 |", stm32[0], stm32[1])));
 }

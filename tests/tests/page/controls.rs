@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use fantoccini::Locator;
 use fantoccini::key::Key;
 use tactomo::board::link::{Control, Playing};
@@ -11,6 +11,7 @@ use tactomo::board::session::RequestedSettings;
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{LinkState, Request, Scan, Snapshot};
 use tactomo::scene::{Contact, SceneName};
+use tactomo::schema::csv_heads;
 use tactomo::simulate::Fault;
 use tactomo::solve::FoundContact;
 use tactomo_protocol::Hello;
@@ -248,13 +249,20 @@ fn picture_and_data_are_saved() -> Result<()> {
             stage.browser.until(ending, |told| told.text("saved").ends_with(ending)).await?;
         }
         let script = "const done = arguments[0];
-            import('./save.js').then(({ csvOf }) => done(csvOf({ electrodes: 2, readings: [0, 0.5, 0.25, 0], contacts: [{ id: 3,
-              place: [0.5, -0.25, 0], conductanceS: 0.125, errorS: null, radiusM: null, forceN: 2, forceErrorN: 0.25,
-              beyondMaximum: true, xErrorM: 0.5, yErrorM: 1, correlation: 0 }] })))";
+            const frame = { electrodes: 2, readings: [0, 0.5, 0.25, 0], sequence: 7, timeS: 1.5, residual: 1, certainty: null };
+            const contact = { id: 3, place: [0.5, -0.25, 0], conductanceS: 0.125, apparentS: null, errorS: null, radiusM: null, forceN: 2,
+              forceErrorN: 0.25, beyondMaximum: true, xErrorM: 0.5, yErrorM: 1, correlation: 0, depthM: null, areaM2: null };
+            import('./save.js').then(({ csvOf }) => done(csvOf({ ...frame, contacts: [contact] }) + csvOf({ ...frame, contacts: [] })))";
         let csv = stage.browser.client.execute_async(script, Vec::new()).await?;
-        let expected = "id,x_m,y_m,z_m,conductance_s,conductance_error_s,apparent_conductance_s,radius_m,force_n,\
-            force_error_n,force_beyond_maximum,x_error_m,y_error_m,correlation\n3,0.5,-0.25,0,0.125,,,,2,0.25,1,0.5,1,0\n\ngrounded,electrode_0_v,electrode_1_v\n0,0,0.5\n1,0.25,0\n";
-        ensure!(csv == expected, "{csv}");
+        let rows: Vec<Vec<_>> =
+            csv.as_str().unwrap_or_default().lines().map(|line| line.split(',').collect()).collect();
+        let [heads, touched, again, untouched] = &rows[..] else { bail!("{csv}") };
+        // One table, whose columns are those of every output, but for the readings.
+        let others = |head: &&&str| csv_heads().iter().all(|known| *known != **head);
+        ensure!(heads.iter().filter(others).all(|head| head.starts_with("readings_v_")), "{csv}");
+        ensure!(heads == again && rows.iter().all(|row| row.len() == heads.len()), "{csv}");
+        ensure!(touched.join(",") == "7,1.5,1,,0,3,0.5,-0.25,0,0.125,,,2,0.25,true,0.5,1,0,,,,0,0.5,0.25,0", "{csv}");
+        ensure!(untouched.join(",") == "7,1.5,1,,,,,,,,,,,,,,,,,,,0,0.5,0.25,0", "{csv}");
         Ok(())
     })
 }

@@ -17,4 +17,5 @@ mod server;
 mod several;
 mod stage;
 mod states;
+mod still;
 mod view;

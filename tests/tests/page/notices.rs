@@ -15,7 +15,7 @@ use crate::stage::in_front_of;
 /// A cause: what a snapshot then has, and what is said of it.
 type Cause = (&'static str, fn(&mut Snapshot));
 
-const CAUSES: [Cause; 7] = [
+const CAUSES: [Cause; 8] = [
     ("no space left", |snapshot| snapshot.refused.recording = Some("no space left".to_owned())),
     ("the board refuses this settle time", |snapshot| {
         snapshot.refused.settings = Some("the board refuses this settle time".to_owned());
@@ -28,6 +28,7 @@ const CAUSES: [Cause; 7] = [
     ("Something pressed at the start.", |snapshot| {
         snapshot.baseline = Some("Something pressed at the start.".to_owned());
     }),
+    ("Press with one finger.", |snapshot| snapshot.wires = Some("Press with one finger.")),
     ("Calibrated on another board.", |snapshot| {
         snapshot.calibration = Some("Calibrated on another board.".to_owned());
     }),

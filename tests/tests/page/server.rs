@@ -331,10 +331,17 @@ fn a_shared_page_needs_its_token_for_everything() -> Result<()> {
 
 #[test]
 fn only_a_shared_page_has_an_address_for_others() -> Result<()> {
-    assert_eq!(Rig::start(None)?.server.shared_url(), None);
+    let code = |rig: &Rig| {
+        let url = rig.server.url();
+        let (host, path) = url.trim_start_matches("http://").split_once('/').context("a path")?;
+        ask(rig.server.port(), &format!("/{path}address.svg"), host, &[])
+    };
+    let alone = Rig::start(None)?;
+    assert_eq!((alone.server.shared_url(), code(&alone)?.status), (None, 404));
     let loopback = Listen { address: Some(Ipv4Addr::LOCALHOST.into()), port: Some(0), ..Listen::default() };
     let rig = Rig::listening(loopback, None)?;
-    assert_eq!(rig.server.shared_url(), Some(rig.server.url()));
+    assert_eq!(rig.server.shared_url(), Some(&*rig.server.url()));
+    assert!(code(&rig)?.body()?.contains("<svg"));
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! The page of several detectors in a browser.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::sync_channel;
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 use serde_json::json;
 use tactomo::detector::Detector;
 use tactomo::readings::Readings;
-use tactomo::run::{LinkState, Snapshot};
+use tactomo::run::{LinkState, Request, Snapshot};
 use tactomo::sink::page::{Listen, PageSetup, Server, Shown};
 use tactomo::sink::place::Place;
 use tactomo::solve::{FoundContact, Solution};
@@ -23,6 +23,7 @@ use crate::stage::{Behind, opened};
 struct Several {
     server: Server,
     snapshots: Vec<Arc<Mutex<Snapshot>>>,
+    requests: Vec<Receiver<Request>>,
     stop: Arc<AtomicBool>,
     publishers: Vec<JoinHandle<()>>,
 }
@@ -41,6 +42,7 @@ impl Several {
         let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
         let stop = Arc::<AtomicBool>::default();
         let (mut shown, mut snapshots, mut publishers) = (Vec::new(), Vec::new(), Vec::new());
+        let mut asked = Vec::new();
         for (name, count) in names.iter().zip(1..) {
             let (sender, receiver) = watch::channel(Arc::default());
             let setup = PageSetup {
@@ -50,7 +52,8 @@ impl Several {
                 source: "a scripted board".to_owned(),
                 finger: None,
             };
-            let (requests, _) = sync_channel(1);
+            let (requests, asked_of_it) = sync_channel(4);
+            asked.push(asked_of_it);
             shown.push(Shown {
                 name: (*name).to_owned(),
                 place: place(f64::from(count)),
@@ -68,7 +71,7 @@ impl Several {
             snapshots.push(snapshot);
         }
         let server = Server::start(Listen { port: Some(port), ..Listen::default() }, shown)?;
-        Ok(Self { server, snapshots, stop, publishers })
+        Ok(Self { server, snapshots, requests: asked, stop, publishers })
     }
 }
 
@@ -116,6 +119,40 @@ fn a_tile_tells_of_its_own_detector_and_opens_its_page() -> Result<()> {
                 .shows("return document.title", |title| title.as_str().is_some_and(|t| t.contains("index")))
                 .await?;
             stage.browser.until("two contacts", |told| told.places_mm().len() == 2).await?;
+            Ok(())
+        },
+    )
+}
+
+#[test]
+fn all_together_have_a_total_a_chart_a_scale_and_are_recorded_at_once() -> Result<()> {
+    opened(
+        || Several::start(&["thumb", "index"]),
+        async |stage| {
+            let text = |id: &str| format!("return document.getElementById('{id}').textContent");
+            stage.browser.shows(&text("touched"), |told| told == "2 of 2").await?;
+            // Three contacts of a millisiemens each.
+            stage.browser.shows(&text("total"), |told| told == "3.00\u{2009}mS").await?;
+            let values = "return JSON.parse(document.getElementById('strip').dataset.values ?? '{}')";
+            let near =
+                |value: &serde_json::Value, expected: f64| value.as_f64().is_some_and(|s| (s - expected).abs() < 1e-6);
+            stage.browser.shows(values, |told| near(&told["1"], 1e-3) && near(&told["2"], 2e-3)).await?;
+            let colours = "const canvas = document.getElementById('colours');
+                const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+                return new Set(new Uint32Array(data.buffer)).size";
+            stage.browser.shows(colours, |told| told.as_i64().is_some_and(|colours| colours > 50)).await?;
+            stage.browser.click("record").await?;
+            for asked in &stage.behind.requests {
+                assert_eq!(asked.recv_timeout(std::time::Duration::from_secs(10))?, Request::Record(true));
+            }
+            for snapshot in &stage.behind.snapshots {
+                snapshot.lock().expect("no test panics with it").recording = Some("touch.tactomo".into());
+            }
+            stage.browser.shows(&text("record"), |told| told == "Stop").await?;
+            stage.browser.click("record").await?;
+            for asked in &stage.behind.requests {
+                assert_eq!(asked.recv_timeout(std::time::Duration::from_secs(10))?, Request::Record(false));
+            }
             Ok(())
         },
     )

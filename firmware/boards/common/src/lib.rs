@@ -7,6 +7,7 @@ pub mod brown_out;
 pub mod clock;
 pub mod converters;
 pub mod panic_record;
+pub mod quartz;
 pub mod range;
 pub mod reset;
 #[cfg(feature = "usb")]

@@ -9,7 +9,7 @@ const MAX_TEXT: usize = 96;
 /// Marks a record that was written whole.
 const MAGIC: [u8; 4] = *b"PNC1";
 
-/// Bytes of a record: a mark, the sum of the rest, the length of the text, the text.
+/// Bytes of a record: a mark, the sum of the text and its length, the length of the text, the text.
 pub const RECORD_BYTES: usize = 4 + 1 + 1 + MAX_TEXT;
 
 /// A view of the memory that outlives a reset. After power-on it holds anything.
@@ -23,7 +23,7 @@ impl PanicRecord<'_> {
         self.store_text(&text(place, panic.message()).0);
     }
 
-    fn store_text(&mut self, text: &String<MAX_TEXT>) {
+    pub(crate) fn store_text(&mut self, text: &String<MAX_TEXT>) {
         let (head, rest) = self.0.split_at_mut(6);
         rest[..text.len()].copy_from_slice(text.as_bytes());
         head.copy_from_slice(&[MAGIC[0], MAGIC[1], MAGIC[2], MAGIC[3], sum(text.as_bytes()), text.len() as u8]);
@@ -67,7 +67,8 @@ fn end_of(path: &str) -> &str {
 
 /// A checksum that notices memory that decayed while the power was off.
 fn sum(text: &[u8]) -> u8 {
-    text.iter().fold(0, |sum: u8, byte| sum.rotate_left(1) ^ byte)
+    // From its length on: zeros behind a text would be none of it else.
+    text.iter().fold(text.len() as u8, |sum, byte| sum.rotate_left(1) ^ byte)
 }
 
 /// Text that keeps what fits and forgets the rest.
@@ -119,8 +120,26 @@ mod tests {
     fn decayed_memory_is_no_message() {
         let mut memory = [0; RECORD_BYTES];
         PanicRecord(&mut memory).store_text(&Cut(String::try_from("main.rs:7").unwrap_or_default()).0);
-        memory[9] ^= 4;
-        assert_eq!(PanicRecord(&mut memory).take(), None);
+        assert_eq!(PanicRecord(&mut memory).text().as_deref(), Some("main.rs:7"));
+        // Any bit of it, and of its mark, sum and length.
+        for bit in 0..8 * (6 + "main.rs:7".len()) {
+            let mut decayed = memory;
+            decayed[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(PanicRecord(&mut decayed).take(), None, "bit {bit}");
+        }
+        memory[5] = 97;
+        assert_eq!(PanicRecord(&mut memory).take(), None, "longer than there is room for");
+    }
+
+    #[test]
+    fn a_text_of_any_length_comes_back_and_a_shorter_one_ends_where_it_ends() {
+        let mut memory = [0xFF; RECORD_BYTES];
+        for length in (0..=MAX_TEXT).rev() {
+            let text = "y".repeat(length);
+            let mut record = PanicRecord(&mut memory);
+            record.store_text(&String::try_from(text.as_str()).unwrap_or_default());
+            assert_eq!(record.take().as_deref(), Some(&*text));
+        }
     }
 
     extern crate std;

@@ -80,4 +80,18 @@ mod tests {
         }
         assert_eq!((Reset::BrownOut.fault(), Reset::Watchdog.fault()), (Some("brown-out"), Some("watchdog")));
     }
+
+    /// Whatever restarted the chip: a panic says more, once.
+    #[test]
+    fn a_panic_is_reported_in_place_of_the_reset_after_it_and_once() {
+        for reset in ALL {
+            let mut memory = [0xA5; RECORD_BYTES];
+            let mut record = PanicRecord(&mut memory);
+            let text = String::try_from("main.rs:7: no").unwrap_or_default();
+            record.store_text(&text);
+            assert_eq!(reset.boot_fault(&mut record), Some(Fault::Panic(text)), "{reset:?}");
+            let after = reset.boot_fault(&mut record);
+            assert!(!matches!(after, Some(Fault::Panic(_))) && after.is_some() == reset.fault().is_some(), "{after:?}");
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! The table that contacts are found by, in the module's flash.
+//! The table that contacts are found by, and room for a new one, in the module's flash.
 
 use esp_hal::peripherals::FLASH;
 use esp_storage::FlashStorage;
@@ -6,10 +6,10 @@ use tactomo_firmware::{ContactFinder, FlashStore, RamCopy};
 
 use crate::ELECTRODES;
 
-/// Where it lies: the last 128 kB of the 4 MB that all these modules have at least. That is the end of espflash's `factory` partition, whose image is
+/// Where they lie: the last 256 kB of the 4 MB that all these modules have at least. That is the end of espflash's `factory` partition, whose image is
 /// looked at by the boot loader no further than it is long.
-const TABLE_AT: u32 = 0x3E_0000;
-/// Room for it (bytes).
+const TABLES_AT: [u32; 2] = [0x3E_0000, 0x3C_0000];
+/// Room for each (bytes).
 const ROOM: usize = 108 * 1024;
 
 /// Finds contacts by a table in flash.
@@ -23,7 +23,7 @@ pub type Finder = ContactFinder<
 /// The driver erases and writes by functions of the chip's ROM with interrupts off, which this firmware has none of; the second core of an ESP32 does not
 /// run. The longest, erasing a sector of 4 kB, takes 45 ms, and by the flash's data sheet (W25Q32JV) 400 ms at most: the watchdog waits longer.
 pub fn finder(flash: FLASH<'static>) -> Finder {
-    ContactFinder::new(FlashStore::new(FlashStorage::new(flash), RamCopy::new(memory()), TABLE_AT))
+    ContactFinder::new(FlashStore::new(FlashStorage::new(flash), RamCopy::new(memory()), TABLES_AT))
 }
 
 /// The table while the board runs. It is a copy in memory: so nothing has to be mapped, and no line of the flash's cache can be of an older table.

@@ -1,8 +1,8 @@
-//! The table that contacts are found by, in the last sector of the chip's flash.
+//! The table that contacts are found by, and room for a new one, in the last two sectors of the chip's flash.
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use embedded_storage::nor_flash::{ErrorType, MultiwriteNorFlash, NorFlash, ReadNorFlash};
 use stm32f4xx_hal::flash::{Error, FlashExt, UnlockedFlash};
 use stm32f4xx_hal::pac::{FLASH, IWDG};
 use stm32f4xx_hal::prelude::*;
@@ -13,8 +13,8 @@ use tactomo_firmware::{ContactFinder, FlashStore, View};
 
 use crate::inputs::ELECTRODES;
 
-/// Where the sector begins in flash, and its length: sector 11 of 12, which `memory.x` keeps free of code.
-const SECTOR_AT: u32 = 0xE_0000;
+/// Where the sectors begin in flash, and their length: sectors 11 and 10 of 12, which `memory.x` keeps free of code.
+const SECTORS_AT: [u32; 2] = [0xE_0000, 0xC_0000];
 const SECTOR_BYTES: usize = 128 * 1024;
 /// The watchdog's time while a sector is erased (ms). By the data sheet that takes 2 s and at most 4 s, with bytes written one at a time as the driver does,
 /// and the watchdog's clock of 32 kHz may have 47: these are 5.4 s at least. No code runs meanwhile, as it is in the same flash.
@@ -29,7 +29,7 @@ pub type Finder = ContactFinder<FlashStore<Flash, Mapped>, { ELECTRODES as usize
 
 /// Finds contacts by the table that is in flash, or will be.
 pub fn finder(flash: FLASH) -> Finder {
-    ContactFinder::new(FlashStore::new(Flash(flash), Mapped, SECTOR_AT))
+    ContactFinder::new(FlashStore::new(Flash(flash), Mapped { at: SECTORS_AT[0] }, SECTORS_AT))
 }
 
 /// The chip's flash, locked but while it is erased or written.
@@ -85,6 +85,9 @@ impl NorFlash for Flash {
     }
 }
 
+/// Bits that are ones may be cleared in words that were written ("Flash memory programming" of the reference manual RM0090).
+impl MultiwriteNorFlash for Flash {}
+
 /// Sets the watchdog's time anew and begins it.
 fn set_watchdog(timeout_ms: u32) {
     // SAFETY: the board's own is not used meanwhile, and keeps nothing but such a handle.
@@ -99,11 +102,18 @@ fn set_watchdog(timeout_ms: u32) {
     watchdog.feed();
 }
 
-/// The sector where it lies.
-pub struct Mapped;
+/// A sector, where it lies.
+pub struct Mapped {
+    at: u32,
+}
 
 impl View<Flash> for Mapped {
     fn bytes<'a>(&'a self, flash: &'a Flash) -> &'a [u8] {
-        flash.0.read().get(SECTOR_AT as usize..).and_then(|rest| rest.get(..SECTOR_BYTES)).unwrap_or_default()
+        flash.0.read().get(self.at as usize..).and_then(|rest| rest.get(..SECTOR_BYTES)).unwrap_or_default()
+    }
+
+    fn open(&mut self, _flash: &mut Flash, base: u32) -> bool {
+        self.at = base;
+        true
     }
 }

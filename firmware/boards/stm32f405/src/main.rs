@@ -6,8 +6,10 @@
 
 mod chip;
 mod flash;
+mod guard;
 mod inputs;
 mod line;
+mod quartz;
 #[cfg(feature = "hid")]
 mod touch_screen;
 
@@ -24,8 +26,6 @@ use crate::chip::{StmChip, boot_fault};
 use crate::inputs::{ELECTRODES, Inputs};
 use crate::line::UsbLine;
 
-/// Quartz of the board (MHz): what the boards with this chip have.
-const QUARTZ_MHZ: u32 = 8;
 /// Clock of the core (MHz): the chip's fastest.
 const CORE_MHZ: u32 = 168;
 
@@ -35,8 +35,15 @@ fn main() -> ! {
     let (Some(device), Some(core)) = (Peripherals::take(), CorePeripherals::take()) else {
         panic!("the peripherals are taken already");
     };
+    guard::arm(&core.MPU);
+    // Before the clock, on an oscillator of its own: whatever hangs from here on ends in a reset.
+    let mut watchdog = IndependentWatchdog::new(device.IWDG);
+    watchdog.start(WATCHDOG_TIMEOUT_MS.millis());
     let fault = boot_fault(&device.RCC);
-    let clocks = Config::hse(QUARTZ_MHZ.MHz()).sysclk(CORE_MHZ.MHz()).require_pll48clk();
+    let Some(quartz_mhz) = quartz::mhz(&device.RCC, &device.TIM11) else {
+        panic!("the board's quartz does not swing, or has neither 8, 12, 16 nor 25 MHz");
+    };
+    let clocks = Config::hse(quartz_mhz.MHz()).sysclk(CORE_MHZ.MHz()).require_pll48clk();
     let mut rcc = device.RCC.freeze(clocks);
     let (a, b, c) = (device.GPIOA.split(&mut rcc), device.GPIOB.split(&mut rcc), device.GPIOC.split(&mut rcc));
     let address = [
@@ -65,8 +72,6 @@ fn main() -> ! {
         panic!("the clock does not start");
     }
     let delay = core.SYST.delay(&rcc.clocks);
-    let mut watchdog = IndependentWatchdog::new(device.IWDG);
-    watchdog.start(WATCHDOG_TIMEOUT_MS.millis());
     let parts = Parts {
         mux: Transparent::new(address),
         sampler: inputs,

@@ -22,6 +22,8 @@ unsafe extern "C" {
     static mut _panic_record: [u8; RECORD_BYTES];
     #[cfg(feature = "contacts")]
     static mut _table: [u8; TABLE_BYTES];
+    #[cfg(feature = "contacts")]
+    static mut _spare: [u8; TABLE_BYTES];
     static _press: Press;
 }
 
@@ -111,12 +113,12 @@ pub fn instructions() -> u64 {
     riscv::register::minstret::read64()
 }
 
-/// The memory for a table.
+/// The memory for a table, and for a new one.
 #[cfg(feature = "contacts")]
-pub fn table_memory() -> &'static mut [u8] {
-    let table = &raw mut _table;
+pub fn table_memory() -> [&'static mut [u8]; 2] {
+    let (table, spare) = (&raw mut _table, &raw mut _spare);
     // SAFETY: RAM that nothing else uses; called once at boot.
-    unsafe { &mut *table }
+    unsafe { [&mut *table, &mut *spare] }
 }
 
 /// Readings of something that presses.

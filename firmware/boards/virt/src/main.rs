@@ -33,6 +33,8 @@ const IDENTITY: Identity = Identity {
 
 /// Scan from which something presses: by then readings at rest are known.
 const PRESSED_FROM: u32 = 80;
+/// Frames in which a search ends: 400 pieces, one after each of 16 rows.
+const SEARCH_FRAMES: u64 = 26;
 /// Frames that a measurement of contacts counts after the search.
 const FOLLOWED_FRAMES: u64 = 32;
 /// Frames that something presses a touch screen, and as many after that.
@@ -147,11 +149,15 @@ fn measure_contacts(board: &mut VirtBoard, gauge: &Gauge) -> ! {
     };
     frames(u64::from(PRESSED_FROM) - 1);
     let at_rest = frames(1);
-    let (landing, search, following) = (frames(1), frames(1), frames(FOLLOWED_FRAMES));
+    let landing = frames(1);
+    // A search goes on between rows, and has ended by then.
+    let searched = frames(SEARCH_FRAMES);
+    let following = frames(FOLLOWED_FRAMES);
+    let search = searched.saturating_sub(following) * SEARCH_FRAMES;
     Report(Uart::new()).line(&[
         ("instructions a frame at rest", at_rest),
         ("instructions a frame in which something lands", landing),
-        ("instructions a frame with a search", search),
+        ("instructions of a search beside frames that are followed", search),
         ("instructions a frame that is followed", following),
         ("stack bytes", gauge::stack_used_bytes() as u64),
         ("board bytes", size_of_val(board) as u64),

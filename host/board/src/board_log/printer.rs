@@ -5,16 +5,20 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use defmt_decoder::{DecodeError, Frame, Table};
+use tactomo_table::file::Format;
 
 use super::ElfError;
 
 /// Packets that may wait to be printed; more are lost, so that printing never holds up frames.
 const QUEUE: usize = 256;
 
+/// An ELF file of the firmware: ours are 2 MB.
+const FORMAT: Format = Format::new("an ELF file of a board", 256 << 20);
+
 /// Starts to print what is sent, with the texts of the firmware file `elf`.
 pub(super) fn start(elf: &Path) -> Result<SyncSender<Vec<u8>>, ElfError> {
     let path = || elf.to_owned();
-    let bytes = std::fs::read(elf).map_err(|source| ElfError::Read { path: path(), source })?;
+    let bytes = FORMAT.read(elf).map_err(|source| ElfError::Read { path: path(), source })?;
     let table = Table::parse(&bytes).map_err(|error| ElfError::Table { path: path(), reason: error.to_string() })?;
     let table = table.ok_or_else(|| ElfError::Table { path: path(), reason: "it has no section .defmt".to_owned() })?;
     let (printer, packets) = sync_channel(QUEUE);

@@ -90,9 +90,10 @@ impl RecordingLoss {
         *self != Self::default()
     }
 
-    /// Whether the file or its bytes are damaged; frames may be missing without, where the board or its line dropped them.
+    /// Whether the file is damaged. In one that is whole, frames may be missing and messages corrupt all the same: lost by the board or on its
+    /// line, before they were kept.
     pub fn is_damage(&self) -> bool {
-        self.file.is_any() || self.corrupt > 0
+        self.file.is_any()
     }
 }
 

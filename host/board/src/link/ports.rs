@@ -36,6 +36,19 @@ pub fn named(port: &str) -> String {
     of_serial(port, ports())
 }
 
+/// The serial number of the USB device on a port, if no other port's device has the same: some makers give all of theirs one.
+pub fn serial_number(port: &str) -> Option<String> {
+    // udev names ports by links.
+    let port = std::fs::canonicalize(port).map_or_else(|_| port.to_owned(), |path| path.display().to_string());
+    serial_of(&port, &ports())
+}
+
+fn serial_of(port: &str, ports: &[Port]) -> Option<String> {
+    let serial = ports.iter().find(|known| known.name == port)?.serial.clone().filter(|serial| !serial.is_empty())?;
+    let is_alone = ports.iter().filter(|other| other.serial.as_ref() == Some(&serial)).count() == 1;
+    is_alone.then_some(serial)
+}
+
 fn of_serial(wanted: &str, ports: Vec<Port>) -> String {
     let is_name = ports.iter().any(|port| port.name == wanted);
     let found = ports.into_iter().find(|port| !is_name && port.serial.as_deref() == Some(wanted));
@@ -64,5 +77,13 @@ mod tests {
         let ports = || vec![port("/dev/ttyUSB0", None), port("/dev/ttyUSB1", Some("0001")), port("COM3", Some("A7"))];
         let found = ["0001", "A7", "/dev/ttyUSB0", "COM9"].map(|wanted| of_serial(wanted, ports()));
         assert_eq!(found, ["/dev/ttyUSB1", "COM3", "/dev/ttyUSB0", "COM9"]);
+        let serials = |ports: &[Port]| ["/dev/ttyUSB0", "/dev/ttyUSB1", "COM3"].map(|name| serial_of(name, ports));
+        assert_eq!(serials(&ports()), [None, Some("0001".to_owned()), Some("A7".to_owned())]);
+        let twice = [ports(), vec![port("/dev/ttyUSB2", Some("0001")), port("COM3", Some(""))]].concat();
+        assert_eq!(
+            serials(&twice),
+            [None, None, Some("A7".to_owned())],
+            "two boards that say the same are not told apart"
+        );
     }
 }

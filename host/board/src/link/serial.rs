@@ -7,7 +7,7 @@ use std::time::Duration;
 use serialport::{ErrorKind, SerialPort};
 use tactomo_physics::causes::with_causes;
 
-use super::Link;
+use super::{Link, ports};
 
 /// What the boards send at, and what common USB bridges keep up with (bits a second).
 pub const DEFAULT_BAUD: u32 = 921_600;
@@ -97,6 +97,10 @@ impl SerialLink {
 impl Link for SerialLink {
     fn name(&self) -> String {
         self.name.clone()
+    }
+
+    fn serial_number(&self) -> Option<String> {
+        ports::serial_number(&self.name)
     }
 
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {

@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use tactomo_physics::new_file::{self, NewFile, NewFileError};
 use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Hello};
 
 use super::packets::FirstPacket;
@@ -21,6 +22,9 @@ pub enum EditError {
     /// One of the recordings.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// The new recording.
+    #[error(transparent)]
+    Output(#[from] NewFileError),
     /// A recording that cannot be read on.
     #[error("cannot read on in {path}")]
     Read {
@@ -64,23 +68,20 @@ pub enum EditError {
 
 /// A new recording that was made of others.
 struct Output {
-    path: PathBuf,
+    file: NewFile,
     writer: RecordWriter<BufWriter<File>>,
-    is_finished: bool,
 }
 
 impl Output {
-    fn create(path: &Path, header: &Header) -> Result<Self, RecordError> {
-        let open = |source| RecordError::Open { path: path.to_owned(), source };
-        let file = BufWriter::new(File::create_new(path).map_err(open)?);
-        let failed = |source| RecordError::Write { path: path.to_owned(), source };
-        let writer = RecordWriter::new(file, header).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), writer, is_finished: false })
+    fn create(path: &Path, header: &Header) -> Result<Self, NewFileError> {
+        let file = NewFile::new(path)?;
+        let writer = RecordWriter::new(file.create()?, header).map_err(|source| file.failed(source))?;
+        Ok(Self { file, writer })
     }
 
     fn failed(&self) -> impl Fn(io::Error) -> EditError + use<> {
-        let path = self.path.clone();
-        move |source| RecordError::Write { path: path.clone(), source }.into()
+        let path = self.file.path().to_owned();
+        move |source| NewFileError::of(&path, source).into()
     }
 
     fn write(&mut self, time_us: u64, bytes: &[u8]) -> Result<(), EditError> {
@@ -92,19 +93,9 @@ impl Output {
     }
 
     fn finish(mut self) -> Result<(), EditError> {
-        let done = self.writer.flush().and_then(|()| self.writer.get_ref().get_ref().sync_all());
+        let done = self.writer.flush().and_then(|()| new_file::sync(self.writer.get_ref().get_ref()));
         done.map_err(self.failed())?;
-        self.is_finished = true;
-        Ok(())
-    }
-}
-
-impl Drop for Output {
-    /// Leaves nothing of a recording that was not completed.
-    fn drop(&mut self) {
-        if !self.is_finished {
-            drop(std::fs::remove_file(&self.path));
-        }
+        Ok(self.file.finish()?)
     }
 }
 

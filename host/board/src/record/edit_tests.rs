@@ -73,7 +73,13 @@ fn a_piece_has_its_frames_its_marks_and_its_time() {
     let refused = cut(&from, 3.0..=4.0, &path("nothing")).unwrap_err().to_string();
     assert!(refused.contains("nothing from 3 s to 4 s") && refused.contains("0.100 s"), "{refused}");
     assert!(!path("nothing").exists());
-    assert!(matches!(cut(&from, 0.0..=1.0, &to), Err(EditError::Record(RecordError::Open { .. }))), "it is there");
+    assert!(
+        matches!(
+            cut(&from, 0.0..=1.0, &to),
+            Err(EditError::Output(tactomo_physics::new_file::NewFileError::Exists { .. }))
+        ),
+        "it is there"
+    );
     [from, to].iter().for_each(|path| std::fs::remove_file(path).unwrap());
 }
 

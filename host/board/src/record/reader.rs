@@ -43,7 +43,11 @@ impl RecordReader<File> {
     /// # Errors
     /// [`RecordError`] if the file is not there, or no recording that this program reads.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
-        let file = File::open(path).map_err(|source| RecordError::Open { path: path.to_owned(), source })?;
+        let open = |source| RecordError::Open { path: path.to_owned(), source };
+        let file = File::open(path).map_err(open)?;
+        if file.metadata().map_err(open)?.is_dir() {
+            return Err(RecordError::Folder { path: path.to_owned() });
+        }
         Self::new(file, path)
     }
 }

@@ -1,6 +1,5 @@
 //! Keeps a recording while it is made, off the thread that receives.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,6 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use tactomo_physics::causes::with_causes;
+use tactomo_physics::new_file::{self, NewFileError};
 use tactomo_protocol::Hello;
 
 use super::packets::FirstPacket;
@@ -58,14 +58,14 @@ pub struct Recorder {
     waiting: Arc<AtomicUsize>,
     most_waiting: usize,
     /// `None` once its error is reported.
-    writer: Option<JoinHandle<io::Result<()>>>,
+    writer: Option<JoinHandle<io::Result<Kept>>>,
 }
 
 /// A recording of which the rest is being written.
 #[derive(Debug)]
 pub struct Closing {
     path: PathBuf,
-    writer: Option<JoinHandle<io::Result<()>>>,
+    writer: Option<JoinHandle<io::Result<Kept>>>,
 }
 
 impl Recorder {
@@ -74,20 +74,29 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`] if the file cannot be written, or is there already: no recording is overwritten.
     pub fn create(path: &Path, header: &Header) -> Result<Self, RecordError> {
-        let open = |source| RecordError::Open { path: path.to_owned(), source };
         // The header tells the time at which its owner calls this.
         let began = Instant::now();
-        let writer = Self::file(path, header).map_err(open)?;
-        let mut recorder = Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)?;
+        let mut recorder = Self::begin(path, header, None)?;
         recorder.began = began;
         Ok(recorder)
     }
 
-    /// A new file with its header.
-    fn file(path: &Path, header: &Header) -> io::Result<RecordWriter<BufWriter<File>>> {
-        let mut writer = RecordWriter::new(BufWriter::new(File::create_new(path)?), header)?;
-        writer.flush()?;
-        Ok(writer)
+    /// Begins a new file with its header, and what the board says of itself; nothing is left of one that takes not even these.
+    fn begin(path: &Path, header: &Header, hello: Option<&Hello>) -> Result<Self, RecordError> {
+        let file = new_file::create(path)?;
+        let is_file = file.metadata().is_ok_and(|found| found.is_file());
+        let begun = RecordWriter::new(BufWriter::new(file), header).and_then(|mut writer| {
+            hello.map_or(Ok(()), |hello| writer.hello(hello))?;
+            writer.flush()?;
+            let kept = if is_file && hello.is_none() { Kept::Nothing } else { Kept::Something };
+            Self::start(path, writer, |file| new_file::sync(file.get_ref()), (MAX_WAITING, kept))
+        });
+        begun.map_err(|source| {
+            if is_file {
+                drop(std::fs::remove_file(path));
+            }
+            NewFileError::of(path, source).into()
+        })
     }
 
     /// Begins a recording in a new file while frames come from a board that has said `hello`. The recording begins with that, twice, so
@@ -101,10 +110,7 @@ impl Recorder {
 
     /// Begins a recording of bytes of which the first came at `began`, some time ago.
     pub(super) fn since(began: Instant, path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
-        let open = |source| RecordError::Open { path: path.to_owned(), source };
-        let mut writer = Self::file(path, header).map_err(open)?;
-        writer.hello(hello).map_err(open)?;
-        let mut recorder = Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)?;
+        let mut recorder = Self::begin(path, header, Some(hello))?;
         (recorder.began, recorder.first) = (began, FirstPacket::within());
         Ok(recorder)
     }
@@ -113,13 +119,14 @@ impl Recorder {
         path: &Path,
         writer: RecordWriter<W>,
         sync: impl FnOnce(&W) -> io::Result<()> + Send + 'static,
-        most_waiting: usize,
+        (most_waiting, kept): (usize, Kept),
     ) -> io::Result<Self> {
         let (entries, queue) = channel();
         let waiting = Arc::new(AtomicUsize::new(0));
         let left = Arc::clone(&waiting);
-        let writer =
-            thread::Builder::new().name("recorder".to_owned()).spawn(move || keep(writer, &queue, &left, sync))?;
+        let writer = thread::Builder::new()
+            .name("recorder".to_owned())
+            .spawn(move || keep(writer, &queue, &left, sync, kept))?;
         Ok(Self {
             path: path.to_owned(),
             began: Instant::now(),
@@ -232,13 +239,30 @@ impl Closing {
 }
 
 /// What came of the writing thread.
-fn outcome(path: &Path, writer: Option<JoinHandle<io::Result<()>>>) -> Result<(), RecordError> {
+fn outcome(path: &Path, writer: Option<JoinHandle<io::Result<Kept>>>) -> Result<(), RecordError> {
     let written = match writer.map(JoinHandle::join) {
         Some(Ok(written)) => written,
         Some(Err(_)) => Err(io::Error::other("the thread that writes it has panicked")),
         None => Err(io::Error::other("it has failed before")),
     };
-    written.map_err(|source| RecordError::Write { path: path.to_owned(), source })
+    match written {
+        Ok(Kept::Something) => Ok(()),
+        // A name that is taken by nothing would stop the next try.
+        Ok(Kept::Nothing) => {
+            drop(std::fs::remove_file(path));
+            Ok(())
+        }
+        Err(source) => Err(RecordError::Write { path: path.to_owned(), source }),
+    }
+}
+
+/// What is in a file that was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kept {
+    /// More than its header, or it is a device.
+    Something,
+    /// Its header alone: no board said anything.
+    Nothing,
 }
 
 /// Writes the queue until it closes.
@@ -247,11 +271,13 @@ fn keep<W: Write>(
     queue: &Receiver<Entry>,
     waiting: &AtomicUsize,
     sync: impl FnOnce(&W) -> io::Result<()>,
-) -> io::Result<()> {
+    mut kept: Kept,
+) -> io::Result<Kept> {
     let mut flushed = Instant::now();
     loop {
         match queue.recv_timeout(FLUSH_EVERY) {
             Ok((time_us, what)) => {
+                kept = Kept::Something;
                 match &what {
                     What::Bytes(bytes) => writer.write(time_us, bytes)?,
                     What::Note(note) => writer.note(time_us, note)?,
@@ -268,7 +294,8 @@ fn keep<W: Write>(
         }
     }
     writer.flush()?;
-    sync(writer.get_ref())
+    sync(writer.get_ref())?;
+    Ok(kept)
 }
 
 #[cfg(test)]
@@ -298,8 +325,18 @@ mod tests {
         recorder.finish().unwrap();
         assert_eq!(chunks(&path), [(1500, b"one".to_vec()), (1500, b"two".to_vec())], "times never fall");
         let again = Recorder::create(&path, &Header::default());
-        assert!(matches!(again, Err(RecordError::Open { .. })));
+        assert!(matches!(again, Err(RecordError::New(NewFileError::Exists { .. }))));
         std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn a_recording_in_which_no_board_said_anything_leaves_no_file() {
+        let path = path("silent");
+        for _ in 0..2 {
+            Recorder::create(&path, &Header::default()).unwrap().finish().unwrap();
+            drop(Recorder::create(&path, &Header::default()).unwrap());
+            assert!(!path.exists());
+        }
     }
 
     #[test]
@@ -342,9 +379,10 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn a_full_disk_is_an_error() {
-        let full = File::create("/dev/full").unwrap();
+        let full = std::fs::File::create("/dev/full").unwrap();
         let writer = RecordWriter { out: BufWriter::new(full), chunk: Vec::new() };
-        let mut recorder = Recorder::start(Path::new("full"), writer, |_| Ok(()), MAX_WAITING).unwrap();
+        let mut recorder =
+            Recorder::start(Path::new("full"), writer, |_| Ok(()), (MAX_WAITING, Kept::Something)).unwrap();
         let error = loop {
             if let Err(error) = recorder.push(&[0; 10_000], Instant::now()) {
                 break error;
@@ -376,7 +414,7 @@ mod tests {
         let (kept, written) = mpsc::channel();
         let writer = RecordWriter { out: Stalled(stall, Vec::new()), chunk: Vec::new() };
         let sync = move |disk: &Stalled| kept.send(disk.1.len()).map_err(io::Error::other);
-        let mut recorder = Recorder::start(Path::new("slow"), writer, sync, 10_000).unwrap();
+        let mut recorder = Recorder::start(Path::new("slow"), writer, sync, (10_000, Kept::Something)).unwrap();
         let begin = Instant::now();
         for _ in 0..10 {
             recorder.push(&[7; 1000], Instant::now()).unwrap();

@@ -1,12 +1,12 @@
 //! Keeps the last seconds of a board, and saves them when something happens.
 
 use std::collections::VecDeque;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
+use tactomo_physics::new_file::NewFileError;
 use tactomo_protocol::Hello;
 
 use super::{Closing, Header, Note, RecordError, Recorder};
@@ -151,8 +151,7 @@ fn create(
     loop {
         *count += 1;
         match make(&numbered(path, *count)) {
-            Err(RecordError::Open { source, .. })
-                if source.kind() == io::ErrorKind::AlreadyExists && *count < MOST_FILES => {}
+            Err(RecordError::New(NewFileError::Exists { .. })) if *count < MOST_FILES => {}
             made => return made,
         }
     }

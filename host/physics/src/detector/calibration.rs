@@ -7,6 +7,10 @@ use super::Parameter;
 pub struct Calibration {
     /// Identity of the board that measured it; none for tables.
     pub board: Option<String>,
+    /// Name of the one sensor that it is of, in files that are kept for the next time; none in those that a person asked for.
+    pub sensor: Option<String>,
+    /// What stands for the description that such a file began from: another one has another.
+    pub description: Option<String>,
     /// When it was calibrated, as a date of ISO 8601.
     pub date: String,
     /// Frames that were used.
@@ -73,7 +77,7 @@ impl Calibration {
     /// What it says of some of the electrodes only.
     pub(super) fn keeping(self, kept: &[usize]) -> Self {
         // All fields by name, as in `Detector::keeping`.
-        let Self { board, date, frames, presses, place_error_m, parameters, directions } = self;
+        let Self { board, sensor, description, date, frames, presses, place_error_m, parameters, directions } = self;
         let renumbered = |known: &CalibratedParameter| match known.parameter.electrode() {
             Some(e) => kept.iter().position(|kept| *kept == e).map(|to| known.parameter.with_electrode(to)),
             None => Some(known.parameter),
@@ -87,6 +91,8 @@ impl Calibration {
             parameters: parameters.iter().zip(&left).filter_map(with_number).collect(),
             directions: directions.iter().map(of_left).collect(),
             board,
+            sensor,
+            description,
             date,
             frames,
             presses,

@@ -6,11 +6,11 @@ mod layers;
 mod skin;
 
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 
 use serde::Deserialize;
+use tactomo_table::file::Format;
 use toml::de::{DeTable, DeValue};
 
 use self::calibration::CalibrationTable;
@@ -23,8 +23,8 @@ use super::preset::{DRIVE_V, ON_RESISTANCE_OHM};
 use super::{Adc, Correction, Detector, ForceLaw, Outline, Surface, SurfaceError, Tolerances, Unevenness};
 use crate::geometry::area;
 
-/// No detector's file is longer (bytes).
-const MAX_BYTES: u64 = 1 << 20;
+/// A detector's file.
+const FORMAT: Format = Format::new("a detector's file", 1 << 20);
 /// An outline whose middle is nearer to the origin stays where it is (m).
 pub(super) const CENTRED_M: f64 = 1e-9;
 
@@ -116,7 +116,7 @@ impl Detector {
     /// [`FileError`] if it cannot be read, or says nothing that could be built.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let named = || path.display().to_string();
-        let text = read_text(path).map_err(|error| FileError::Read { path: named(), error })?;
+        let text = FORMAT.read_text(path).map_err(|error| FileError::Read { path: named(), error })?;
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::from_toml_in(folder, &text, &stem).map_err(|error| FileError::Wrong { path: named(), error })
@@ -359,15 +359,6 @@ type ReadSurface<'a> = dyn Fn(&str, &str) -> Result<Surface, Problem> + 'a;
 fn surface_problem(path: &str, error: SurfaceError) -> Problem {
     let field = if matches!(error, SurfaceError::Unit(_)) { "surface_unit" } else { "surface" };
     Problem::new(field, format!("{path}: {error}"))
-}
-
-fn read_text(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    File::open(path)?.take(MAX_BYTES + 1).read_to_string(&mut text)?;
-    if text.len() as u64 > MAX_BYTES {
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "it is longer than 1 MiB"));
-    }
-    Ok(text)
 }
 
 /// A basic string of TOML.

@@ -3,13 +3,13 @@
 //! `TACTOJAC`, the format's version as four bytes (little-endian), the [`Jacobian`] in postcard, and the CRC-32 (ISO-HDLC)
 //! of all bytes before as four bytes (little-endian). The detector is in it, so that it is never used for another.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+use tactomo_table::file::Format;
 
 use super::ImageMesh;
 use super::jacobian::Jacobian;
@@ -17,15 +17,17 @@ use crate::detector::{Detector, Surface};
 
 const MAGIC: &[u8; 8] = b"TACTOJAC";
 const VERSION: u32 = 4;
+/// Fields of 16384 nodes for 32 electrodes take 4 MiB.
+const FORMAT: Format = Format::new("a Jacobian", 64 << 20);
 const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Why a Jacobian cannot be saved or loaded.
+/// Why a Jacobian cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JacobianFileError {
-    /// The file cannot be read or written.
-    #[error("cannot read or write {}", path.display())]
-    Io {
+    /// The file cannot be read.
+    #[error("cannot read {}", path.display())]
+    Read {
         /// The file.
         path: PathBuf,
         /// What the system says.
@@ -61,17 +63,16 @@ pub enum JacobianFileError {
 }
 
 impl Jacobian {
-    /// Writes it to a file.
+    /// The content of its file.
     ///
     /// # Errors
-    /// [`JacobianFileError::Io`] if the file cannot be written.
-    pub fn save(&self, path: &Path) -> Result<(), JacobianFileError> {
-        let io = |source| JacobianFileError::Io { path: path.to_owned(), source };
+    /// If memory ends.
+    pub fn to_bytes(&self) -> io::Result<Vec<u8>> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(VERSION.to_le_bytes());
-        let mut bytes = postcard::to_extend(&Stored::from(self), bytes).map_err(|error| io(io::Error::other(error)))?;
+        let mut bytes = postcard::to_extend(&Stored::from(self), bytes).map_err(io::Error::other)?;
         bytes.extend(CHECKSUM.checksum(&bytes).to_le_bytes());
-        fs::write(path, bytes).map_err(io)
+        Ok(bytes)
     }
 
     /// Reads the file of a detector. Its name and its analogue-to-digital converter may differ: they change nothing here.
@@ -79,7 +80,7 @@ impl Jacobian {
     /// # Errors
     /// [`JacobianFileError`] if it is no whole file of this format or was made for another detector.
     pub fn load(path: &Path, detector: &Detector) -> Result<Self, JacobianFileError> {
-        let bytes = fs::read(path).map_err(|source| JacobianFileError::Io { path: path.to_owned(), source })?;
+        let bytes = FORMAT.read(path).map_err(|source| JacobianFileError::Read { path: path.to_owned(), source })?;
         let jacobian = parse(&bytes, path)?;
         match difference(&jacobian.detector, detector) {
             Some(difference) => Err(JacobianFileError::OtherDetector { path: path.to_owned(), difference }),
@@ -181,6 +182,8 @@ impl Stored {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::forward::shell::Shell;
 
@@ -199,7 +202,7 @@ mod tests {
     fn comes_back_as_it_was_and_only_for_its_detector() -> Result<(), Box<dyn std::error::Error>> {
         let path = std::env::temp_dir().join(format!("tactomo-{}.jacobian", std::process::id()));
         let saved = jacobian();
-        saved.save(&path)?;
+        fs::write(&path, saved.to_bytes()?)?;
         assert_eq!(Jacobian::load(&path, &saved.detector)?, saved);
         let mut other = saved.detector.clone();
         other.electrodes[3].x_m += 1e-5;
@@ -233,11 +236,8 @@ mod tests {
 
     #[test]
     fn damage_is_found() -> Result<(), Box<dyn std::error::Error>> {
-        let path = std::env::temp_dir().join(format!("tactomo-damage-{}.jacobian", std::process::id()));
-        jacobian().save(&path)?;
-        let whole = fs::read(&path)?;
-        fs::remove_file(&path)?;
-        let message = |bytes: &[u8]| parse(bytes, &path).map_or_else(|error| error.to_string(), |_| String::new());
+        let (whole, path) = (jacobian().to_bytes()?, Path::new("my.jacobian"));
+        let message = |bytes: &[u8]| parse(bytes, path).map_or_else(|error| error.to_string(), |_| String::new());
         let changed = |at: usize| {
             whole.iter().enumerate().map(|(i, &byte)| if i == at { byte ^ 1 } else { byte }).collect::<Vec<_>>()
         };

@@ -28,11 +28,37 @@ pub const POISSON: f64 = 0.3;
 /// hard ground it is about a fifth narrower (Dimitriadis et al., for an incompressible layer; foam is nearer to Hertz).
 const LARGEST_SHARE: f64 = 0.5;
 
-const YOUNG_PA: RangeInclusive<f64> = 1e2..=1e12;
-/// Of stable solids above -1.
-const RATIO: RangeInclusive<f64> = -0.99..=0.5;
+/// Forces that something presses with (N): from a grain of sand's to a car's on its wheel.
+pub const FORCE_N: RangeInclusive<f64> = 1e-6..=1e4;
+/// Radii of tips that press (m): from a needle's to a head's.
+pub const TIP_M: RangeInclusive<f64> = 1e-5..=1.0;
+/// Young's moduli (Pa): from a jelly's to a diamond's.
+pub const YOUNG_PA: RangeInclusive<f64> = 1e2..=1e12;
+/// Poisson's ratios: of stable solids above -1.
+pub const RATIO: RangeInclusive<f64> = -0.99..=0.5;
 const UNIT_PA: RangeInclusive<f64> = 1.0..=1e12;
 const DEPTH_M: RangeInclusive<f64> = 1e-9..=1.0;
+
+/// A press that nothing presses with.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "a press needs a tip with a radius from {:?} m to {:?} m, and a force from {:?} N to {:?} N: {radius_m:?} m and {force_n:?} N are given",
+    TIP_M.start(), TIP_M.end(), FORCE_N.start(), FORCE_N.end()
+)]
+pub struct PressError {
+    /// Radius of the tip (m).
+    pub radius_m: f64,
+    /// Force (N).
+    pub force_n: f64,
+}
+
+/// Checks that something may press so.
+///
+/// # Errors
+/// [`PressError`] if it is too small or too large.
+pub fn check_press(radius_m: f64, force_n: f64) -> Result<(), PressError> {
+    if TIP_M.contains(&radius_m) && FORCE_N.contains(&force_n) { Ok(()) } else { Err(PressError { radius_m, force_n }) }
+}
 
 /// What a detector's layers are to the touch: all of them together, and the surface that is touched.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -1,9 +1,31 @@
 //! Contacts of any shape.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
 
 use super::Contact;
 use crate::geometry::{self, Point};
+
+/// Conductances of a touch (S): from an insulator's to a bar of copper's.
+const CONDUCTANCE_S: RangeInclusive<f64> = 1e-12..=1e6;
+/// Lengths of a touch (m), as of a detector.
+const LENGTH_M: RangeInclusive<f64> = 1e-6..=10.0;
+/// Farthest from the middle of a detector (m).
+const FAR_M: f64 = 10.0;
+
+/// A number of a touch that nothing has which touches.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{name} is {value:?}, but has to be from {lowest:?} to {highest:?}")]
+pub struct TouchError {
+    /// Name of the number, with its unit.
+    pub name: &'static str,
+    /// What it is.
+    pub value: f64,
+    /// The least that it may be.
+    pub lowest: f64,
+    /// The most that it may be.
+    pub highest: f64,
+}
 
 /// Corners of the polygon that stands for a disc, and of the pieces of a ring.
 const CORNERS: usize = 64;
@@ -75,6 +97,29 @@ impl Touch {
         let Shape::Disc { radius_m } = self.shape else { return None };
         let [x_m, y_m] = self.centre_m;
         Some(Contact { x_m, y_m, z_m: self.z_m, radius_m, conductance_s: self.conductance_s })
+    }
+
+    /// Checks that its numbers can be those of something that touches. Whether it lies on a detector is the model's matter.
+    ///
+    /// # Errors
+    /// The first number that cannot be.
+    pub fn check(&self) -> Result<(), TouchError> {
+        let [x_m, y_m] = self.centre_m;
+        let far = [("x_m", x_m), ("y_m", y_m), ("z_m", self.z_m)].map(|(name, value)| (name, value, -FAR_M..=FAR_M));
+        let sizes = match self.shape {
+            Shape::Disc { radius_m } => vec![("radius_m", radius_m)],
+            Shape::Ring { radius_m, width_m } => vec![("radius_m", radius_m), ("width_m", width_m)],
+            Shape::Line { length_m, width_m, .. } => vec![("length_m", length_m), ("width_m", width_m)],
+            Shape::Polygon { .. } => Vec::new(),
+        };
+        let sizes = sizes.into_iter().map(|(name, value)| (name, value, LENGTH_M));
+        let all = far.into_iter().chain(sizes).chain([("conductance_s", self.conductance_s, CONDUCTANCE_S)]);
+        match all.into_iter().find(|(_, value, range)| !range.contains(value)) {
+            Some((name, value, range)) => {
+                Err(TouchError { name, value, lowest: *range.start(), highest: *range.end() })
+            }
+            None => Ok(()),
+        }
     }
 
     /// Conductance per area (S/m2), or what is wrong with the touch.
@@ -154,6 +199,26 @@ fn strip(length_m: f64, width_m: f64, angle_rad: f64) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_nothing_has_which_touches_are_told_by_name_and_range() {
+        let disc = |x_m, radius_m, conductance_s| Touch::flat([x_m, 0.0], Shape::Disc { radius_m }, conductance_s);
+        assert_eq!(disc(0.0, 0.003, 1e-3).check(), Ok(()));
+        for (touch, told) in [
+            (disc(1e308, 0.003, 1e-3), "x_m is 1e308, but has to be from -10.0 to 10.0"),
+            (disc(f64::NAN, 0.003, 1e-3), "x_m is NaN"),
+            (disc(0.0, 1e308, 1e-3), "radius_m is 1e308, but has to be from 1e-6 to 10.0"),
+            (disc(0.0, 0.003, -1.0), "conductance_s is -1.0, but has to be from 1e-12 to 1000000.0"),
+            (disc(0.0, 0.003, 1e308), "conductance_s is 1e308"),
+            (
+                Touch::flat([0.0; 2], Shape::Line { length_m: 0.02, width_m: 0.0, angle_rad: 0.0 }, 1e-3),
+                "width_m is 0.0",
+            ),
+        ] {
+            let error = touch.check().unwrap_err().to_string();
+            assert!(error.starts_with(told), "{error}");
+        }
+    }
 
     #[test]
     fn pieces_have_the_area_of_the_shape_and_its_middle() {

@@ -15,7 +15,7 @@ use tactomo::board::link::Control;
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::session::RequestedSettings;
 use tactomo::changes::Changes;
-use tactomo::run::calibration::Learning;
+use tactomo::run::calibration::{Keeping, Learning};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{LinkState, Request, TouchEvent as Answered};
 use tactomo::scene::SceneName;
@@ -129,8 +129,7 @@ impl Live {
             return Err(refused("kept: no detector is learned of a recording, with learn=False, or by learned"));
         }
         let detector = source.detector(detector.map(|detector| detector.0.clone()))?;
-        let learning = Learning::of(&detector, None).filter(|_| learns);
-        let learning = learning.map(|learning| Learning { file: kept, ..learning });
+        let learning = Learning::of(&detector, kept.map_or(Keeping::Nowhere, Keeping::In)).filter(|_| learns);
         let scan: ScanChoice = scan.parse().map_err(|error: String| refused(format!("scan: {error}")))?;
         scan.check(detector.electrodes.len()).map_err(|error| refused(format!("scan: {error}")))?;
         let seconds = seconds.map(|seconds| {

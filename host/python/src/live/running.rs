@@ -53,8 +53,8 @@ impl Wanted {
     /// Starts it; its events are put into the queue.
     pub fn start(&self, queue: &Arc<Queue>) -> PyResult<Running> {
         let mut source = self.source.open(&self.detector)?;
-        let kept = self.learning.as_ref().map(Learning::kept).transpose().map_err(refused)?.flatten();
-        let detector = kept.unwrap_or_else(|| self.detector.clone());
+        self.learning.as_ref().map_or(Ok(()), Learning::check).map_err(refused)?;
+        let detector = self.detector.clone();
         let problem = Problem::of(&detector).map_err(raised)?;
         let problem = match &self.learned {
             Some(learned) => problem.with_learned(learned.clone()).map_err(raised)?,

@@ -17,6 +17,7 @@ use tactomo_protocol::Settings;
 
 use crate::commands::source::{self, BoardArgs};
 use tactomo_cli::choice::{DetectorArgs, Model};
+use tactomo_cli::options;
 use tactomo_cli::output::{self, message};
 
 /// How often a person who is waited for is told what hinders.
@@ -39,7 +40,7 @@ pub struct Args {
     #[command(flatten)]
     detector: DetectorArgs,
     /// How long each touch that is asked for is waited for (s)
-    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = source::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = options::seconds)]
     patience: Duration,
     /// Prints `{source, board, firmware, frames, frames_per_s, dropped, corrupt, faults, presses, electrodes, notes, sound, settling}` as JSON
     #[arg(long)]

@@ -1,17 +1,16 @@
 //! Whether an image can run on a board: the head of an ELF file, and where its segments lie
 //! (System V ABI, "Object Files", <https://refspecs.linuxfoundation.org/elf/gabi4+/ch4.eheader.html>).
 
-use std::fs::File;
-use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
+use tactomo::table::file::Format;
 
 use super::firmware::Board;
 
-/// No image with its symbols is longer (bytes): ours are 2 MB.
-const LONGEST: u64 = 256 << 20;
+/// An image with its symbols: ours are 2 MB.
+const FORMAT: Format = Format::new("an image of a board", 256 << 20);
 /// Bytes of the head and of an entry of the table of segments, in 32 bits.
 const HEAD: usize = 52;
 const SEGMENT: usize = 32;
@@ -35,9 +34,9 @@ struct Chip {
 const XTENSA: (u16, &str) = (94, "Xtensa");
 const RISC_V: (u16, &str) = (243, "RISC-V");
 const ARM: (u16, &str) = (40, "ARM");
-/// Of 4 MB of flash behind espflash's boot loader and partition table (espflash 4: `factory` from 0x10000, 0x3f0000 long), without the last 128 kB, where the
-/// board keeps its table (`firmware/boards/espressif/src/table.rs`).
-const ESP_FLASH: u64 = 0x3d_0000;
+/// Of 4 MB of flash behind espflash's boot loader and partition table (espflash 4: `factory` from 0x10000, 0x3f0000 long), without the last 256 kB, where the
+/// board keeps its tables (`firmware/boards/espressif/src/table.rs`).
+const ESP_FLASH: u64 = 0x3b_0000;
 
 impl Chip {
     /// Addresses are those of esp-hal 1.2's `ld/CHIP/memory.x`, caches and parts kept for the boot loader included, and of our `memory.x`.
@@ -74,8 +73,8 @@ impl Chip {
             },
             Board::Stm32f405 => Self {
                 machine: ARM,
-                memories: &[0x0800_0000..0x080e_0000, 0x1000_0000..0x1001_0000, 0x2000_0000..0x2002_0000],
-                flash: 0xe_0000,
+                memories: &[0x0800_0000..0x080c_0000, 0x1000_0000..0x1001_0000, 0x2000_0000..0x2002_0000],
+                flash: 0xc_0000,
             },
         }
     }
@@ -100,9 +99,7 @@ struct Segment {
 /// If it is no image, or none for this board: what it is, and what to do.
 pub fn check(path: &Path, board: Board) -> anyhow::Result<()> {
     let named = || path.display().to_string();
-    let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(LONGEST).read_to_end(&mut bytes));
-    read.with_context(|| format!("cannot read the image {}", named()))?;
+    let bytes = FORMAT.read(path).with_context(|| format!("cannot read the image {}", named()))?;
     judge(&bytes, board).with_context(|| {
         format!(
             "{} is no image for the board {}: build one with {}, or name another with --image",

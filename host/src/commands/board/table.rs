@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use serde::Serialize;
 use tactomo::detector::Detector;
 use tactomo::run::table::{Given, What, give};
+use tactomo::solve::CompiledTable;
 
 use crate::commands::source::{self, BoardArgs};
 use tactomo_cli::choice::DetectorArgs;
@@ -45,7 +45,7 @@ struct Told<'a> {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let detector: Detector = source::described(&args.board, args.detector.get_or(args.board.scene.preset())?);
     let what = match &args.file {
-        Some(path) => What::Table(std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?),
+        Some(path) => What::Table(CompiledTable::read(path)?),
         None => What::Detector(Box::new(detector.clone())),
     };
     let (mut source, _) = source::board(&args.board, &detector)?;

@@ -15,6 +15,7 @@ use self::known::Known;
 use self::report::Report;
 use super::Reading;
 use tactomo_cli::choice::DetectorArgs;
+use tactomo_cli::options;
 use tactomo_cli::output::{self, NewFile, message};
 
 /// Finds which force is behind a contact's conductance, from presses of known force.
@@ -54,7 +55,7 @@ pub struct PressArgs {
     #[command(flatten)]
     pub detector: DetectorArgs,
     /// Force of each press (N): of each row of a table, of each press of a recording
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = newtons)]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = options::force())]
     newtons: Vec<f64>,
     /// The same from a table with a column `force_n`, and `unloading` if that is known: 1 where the force was falling, else 0; or a force
     /// sensor's: columns `time_s`, since the recording's first frame, and `force_n`
@@ -74,7 +75,7 @@ impl PressArgs {
 
 /// Fits a law and writes the detector with it.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let out = NewFile::never_replacing(&args.out)?;
+    let out = NewFile::new(&args.out)?;
     let known = args.presses.known()?.context("give --newtons or --forces: which forces were the presses?")?;
     let gathered = gather(&args.presses, &known)?;
     let presses: Vec<_> = gathered.presses.iter().map(|press| press.press).collect();
@@ -87,11 +88,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         output::print(&serde_json::to_string(&report)?)?;
     }
     Ok(())
-}
-
-fn newtons(text: &str) -> Result<f64, String> {
-    let force_n = text.trim().parse::<f64>().ok().filter(|force_n| *force_n > 0.0 && force_n.is_finite());
-    force_n.ok_or_else(|| "a force in newtons above 0 is needed for each press".to_owned())
 }
 
 fn law(text: &str) -> Result<Law, String> {

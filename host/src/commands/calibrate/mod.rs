@@ -16,8 +16,9 @@ use tactomo::detector::Detector;
 use super::reconstruct::reader::Reader;
 use super::reconstruct::units::Unit;
 use super::record;
-use super::source::{self, BoardArgs};
+use super::source::BoardArgs;
 use tactomo_cli::choice::DetectorArgs;
+use tactomo_cli::options;
 use tactomo_cli::output::{NewFile, message};
 
 /// Fits a detector's description to the detector that was built.
@@ -63,7 +64,7 @@ struct Source {
     #[command(flatten)]
     detector: DetectorArgs,
     /// How long a board is recorded (s)
-    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = source::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = options::seconds)]
     seconds: Duration,
 }
 
@@ -121,9 +122,9 @@ pub fn write(detector: &Detector, path: &Path, out: NewFile) -> anyhow::Result<(
         let is_there = fs::metadata(&beside).is_ok_and(|data| data.is_file() && data.len() == obj.len() as u64)
             && fs::read(&beside).is_ok_and(|there| there == obj.as_bytes());
         if !is_there {
-            NewFile::never_replacing(&beside)?.write(&obj)?;
+            NewFile::new(&beside)?.write(&obj)?;
             message!("its surface: {}", beside.display());
         }
     }
-    out.write(&text)
+    Ok(out.write(&text)?)
 }

@@ -52,7 +52,7 @@ pub struct Args {
 
 /// Finds the correction and writes the detector with it.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let out = NewFile::never_replacing(&args.out)?;
+    let out = NewFile::new(&args.out)?;
     ensure!(
         !args.source.board.is_simulated(),
         "the scenes of the simulated board press no known places: give a FILE of presses (`tactomo forward --measured` simulates rows), or --port"

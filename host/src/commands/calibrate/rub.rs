@@ -56,7 +56,7 @@ pub struct Args {
 
 /// Fits the detector and writes it.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let out = NewFile::never_replacing(&args.out)?;
+    let out = NewFile::new(&args.out)?;
     let what = "rub one fingertip over the whole sensor, now light and now firm";
     let file = args.source.file(&args.out, what)?;
     let (nominal, board, frames) = frames(args, &file)?;

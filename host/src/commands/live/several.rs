@@ -4,10 +4,11 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
+use tactomo::board::identity::port_label;
 
 use super::Args;
 use super::skin::{self, Patch};
-use crate::commands::recording::folder::{EXTENSION, SKIN};
+use crate::commands::recording::folder::{self, EXTENSION, SKIN};
 use crate::commands::streams::StreamArgs;
 
 /// The detectors to show; `None` if it is one.
@@ -16,7 +17,7 @@ use crate::commands::streams::StreamArgs;
 /// If the skin is none, or they cannot be recorded.
 pub fn detectors(args: &Args) -> anyhow::Result<Option<Vec<Patch>>> {
     let mut all = match &args.skin {
-        Some(path) => skin::read(&if path.is_dir() { path.join(SKIN) } else { path.clone() })?,
+        Some(path) => skin::read(path)?,
         None if args.board.boards() > 1 => boards(args)?,
         None => return Ok(None),
     };
@@ -38,8 +39,10 @@ fn boards(args: &Args) -> anyhow::Result<Vec<Patch>> {
     let on_port = |port: &String| {
         let mut board = of_one();
         board.board.ports = vec![port.clone()];
-        Patch { name: name_of(port), place: None, args: board }
+        Patch { name: port_label(port), place: None, args: board }
     };
+    let count = args.board.ports.len();
+    ensure!(count <= skin::MOST, "{count} ports are given, and {} boards can be shown together", skin::MOST);
     let ports = args.board.ports.iter().map(on_port);
     let all: Vec<_> = (0..args.board.simulate.unwrap_or(0)).map(simulated).chain(ports).collect();
     for (i, Patch { name, .. }) in all.iter().enumerate() {
@@ -51,8 +54,7 @@ fn boards(args: &Args) -> anyhow::Result<Vec<Patch>> {
 
 /// Has each of them recorded in a folder, which can be shown again as it is.
 fn record(all: &mut [Patch], folder: &Path) -> anyhow::Result<()> {
-    fs::create_dir(folder)
-        .with_context(|| format!("cannot make the folder {} for the recordings of all", folder.display()))?;
+    folder::make(folder).context("the recordings of all go into a new folder")?;
     let mut skin = String::new();
     for Patch { name, place, args } in all.iter_mut().filter(|patch| patch.args.replay.is_none()) {
         let file = format!("{name}.{EXTENSION}");
@@ -62,21 +64,4 @@ fn record(all: &mut [Patch], folder: &Path) -> anyhow::Result<()> {
     }
     let path = folder.join(SKIN);
     fs::write(&path, skin).with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// What a board on a port is called: the port's last part, of letters that an address may have.
-fn name_of(port: &str) -> String {
-    let last = port.rsplit(['/', '\\']).next().unwrap_or(port);
-    last.chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn boards_are_called_as_their_ports_end() {
-        let names = ["/dev/ttyUSB0", "COM3", r"\\.\COM12", "/dev/serial/by-id/usb-1a86_USB_Serial-if00"].map(name_of);
-        assert_eq!(names, ["ttyUSB0", "COM3", "COM12", "usb-1a86_USB_Serial-if00"]);
-    }
 }

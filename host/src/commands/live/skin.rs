@@ -2,14 +2,26 @@
 //!
 //! A skin's file has a table `[[patch]]` for each detector: its `name`, its `place` on the body if it has one, and whatever options of `tactomo live`
 //! belong to one board, by their names. So what a patch may be asked for is what the command may be, and is checked by the same rules.
+//!
+//! A folder of recordings has such a file too, which comes from who knows where. It only says which of the folder's recordings are shown, and where their
+//! detectors lie: nothing in it has a file written, a port opened, or a file read that is not the folder's own.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use tactomo::causes::with_causes;
 use tactomo::sink::place::Place;
+use tactomo::table::file::{self, Format};
+use tactomo_cli::options;
 
 use super::Args;
+use crate::commands::recording::folder::{self, SKIN};
+
+/// Most detectors that are shown together, of boards that are simulated too.
+pub const MOST: usize = 64;
+/// A skin's file.
+pub const FORMAT: Format = Format::new("a skin's file", 1 << 20);
 
 /// Options of the program as a whole, which a patch has none of.
 const OF_ALL: [&str; 7] = ["skin", "http-port", "listen", "allow-origin", "no-open", "json", "seconds"];
@@ -107,20 +119,29 @@ struct Options {
     args: Args,
 }
 
-/// The detectors of a skin.
+/// The detectors of a skin's file, or of a folder of recordings.
 ///
 /// # Errors
 /// [`SkinError`] if the file is no skin, or a patch asks for what cannot be.
 pub fn read(path: &Path) -> Result<Vec<Patch>, SkinError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SkinError::Read { path: path.to_owned(), source })?;
-    of_text(&text, path)
+    let (path, is_folder) = if path.is_dir() { (path.join(SKIN), true) } else { (path.to_owned(), false) };
+    let checked = if is_folder { folder::check_own(&path) } else { Ok(()) };
+    let text = checked.and_then(|()| FORMAT.read_text(&path));
+    let text = text.map_err(|source| SkinError::Read { path: path.clone(), source })?;
+    let words: Words = if is_folder { of_recording } else { words };
+    of_text(&text, &path, words)
 }
 
-fn of_text(text: &str, path: &Path) -> Result<Vec<Patch>, SkinError> {
+/// Makes a command line of a patch's options; files that they name are sought in the folder.
+type Words = fn(&toml::Table, &Path) -> Result<Vec<String>, String>;
+
+fn of_text(text: &str, path: &Path, words: Words) -> Result<Vec<Patch>, SkinError> {
     let no_skin = |what: String| SkinError::Skin { path: path.to_owned(), what };
     let File { patch: patches } = toml::from_str(text).map_err(|error| no_skin(with_causes(&error)))?;
-    if patches.is_empty() {
-        return Err(no_skin("it has no [[patch]]".to_owned()));
+    match patches.len() {
+        0 => return Err(no_skin("it has no [[patch]]".to_owned())),
+        1..=MOST => {}
+        many => return Err(no_skin(format!("it has {many} patches, and {MOST} can be shown together"))),
     }
     let mut read: Vec<Patch> = Vec::with_capacity(patches.len());
     for Table { name, place, options } in patches {
@@ -151,16 +172,44 @@ fn placed(place: toml::Value) -> Result<Place, String> {
     Ok(place)
 }
 
+/// The recording of a patch in a folder, as a word of a command line: whatever else it asks for is refused.
+fn of_recording(options: &toml::Table, folder: &Path) -> Result<Vec<String>, String> {
+    if let Some(key) = options.keys().find(|key| *key != "replay") {
+        return Err(format!(
+            "{key:?} is not obeyed in a folder of recordings: there a patch has name, replay and place only"
+        ));
+    }
+    let name = options.get("replay").and_then(toml::Value::as_str);
+    let name = name.ok_or("it needs replay, the name of a recording in the folder")?;
+    if name.is_empty() || name == ".." || name.contains(['/', '\\', ':']) {
+        return Err(format!("replay is {name:?}, which is not the name of a recording in the folder"));
+    }
+    let recording = folder.join(name);
+    folder::check_own(&recording).map_err(|error| format!("replay {name:?}: {error}"))?;
+    Ok(vec![format!("--replay={}", recording.display())])
+}
+
 /// Options as words of a command line.
 fn words(options: &toml::Table, folder: &Path) -> Result<Vec<String>, String> {
+    let command = Options::command();
     let mut words = Vec::new();
     for (key, value) in options {
         let option = key.replace('_', "-");
         if OF_ALL.contains(&option.as_str()) {
             return Err(format!("{key} is of the program as a whole: give --{option} on the command line"));
         }
+        // No key is a word of a command line by itself: it might have a value in it, or another option.
+        if !command.get_arguments().any(|known| known.get_long() == Some(&*option)) {
+            return Err(format!("{key:?} is no option of `tactomo live`; its --help has them all"));
+        }
         let word = |value: &toml::Value| match value {
-            toml::Value::String(text) if is_file(&option, text) => Ok(folder.join(text).display().to_string()),
+            toml::Value::String(text) if is_file(&option, text) => {
+                let path = folder.join(text);
+                match file::check_regular(&path) {
+                    Err(error) if error.kind() != ErrorKind::NotFound => Err(format!("{key} {text:?}: {error}")),
+                    _ => Ok(path.display().to_string()),
+                }
+            }
             toml::Value::String(text) => Ok(text.clone()),
             toml::Value::Integer(number) => Ok(number.to_string()),
             toml::Value::Float(number) => Ok(number.to_string()),
@@ -187,7 +236,7 @@ fn is_file(option: &str, text: &str) -> bool {
 
 /// What a command line's parser says, in a line.
 fn said(error: &clap::Error) -> String {
-    let text = error.to_string();
+    let text = options::told(error);
     let lines =
         text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage") && !line.starts_with("For more"));
     let all: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
@@ -202,7 +251,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Vec<Patch>, String> {
-        of_text(text, Path::new("skins/hand.toml")).map_err(|error| error.to_string())
+        of_text(text, Path::new("skins/hand.toml"), words).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -248,6 +297,42 @@ mod tests {
     }
 
     #[test]
+    fn of_a_folder_only_its_own_recordings_and_their_places_count() {
+        let folder = std::env::temp_dir().join(format!("tactomo-{}-skin-folder", std::process::id()));
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
+        std::fs::write(folder.join("thumb.tactomo"), "").unwrap();
+        let read = |options: &str| {
+            std::fs::write(folder.join(SKIN), format!("[[patch]]\nname = \"thumb\"\n{options}\n")).unwrap();
+            super::read(&folder).map_err(|error| error.to_string())
+        };
+        let patches = read("replay = \"thumb.tactomo\"\nplace = { xyz_m = [0, 0, 1] }").unwrap();
+        assert_eq!(patches[0].args.replay, Some(folder.join("thumb.tactomo")));
+        assert!(patches[0].place.is_some());
+        // Every option of the command but the one, and what is none.
+        let command = Options::command();
+        let keys = command.get_arguments().filter_map(clap::Arg::get_long).filter(|key| *key != "replay");
+        for key in keys.chain(["port_", "listen=0.0.0.0:7999"]) {
+            for value in ["true", "false", "\"a\"", "1", "[\"a\"]"] {
+                let refused = read(&format!("replay = \"thumb.tactomo\"\n{key:?} = {value}")).err().unwrap();
+                assert!(refused.contains("patch thumb of ") && refused.contains(&format!("{key:?}")), "{refused}");
+            }
+        }
+        for name in ["../thumb.tactomo", "/dev/zero", "sub", "sub/a", "..", ".", "", "a\\\\b", "none.tactomo", "c:a"] {
+            let refused = read(&format!("replay = \"{name}\"")).err().unwrap();
+            assert!(refused.contains("patch thumb of ") && refused.contains("replay"), "{name}: {refused}");
+        }
+        for options in ["", "replay = true", "replay = [\"thumb.tactomo\"]"] {
+            assert!(read(options).err().unwrap().contains("it needs replay"), "{options}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("/etc/hostname", folder.join("link.tactomo")).unwrap();
+            assert!(read("replay = \"link.tactomo\"").err().unwrap().contains("it is a link"));
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
     fn what_is_wrong_is_named_with_its_patch() {
         let of = |options: &str| read(&format!("[[patch]]\nname = \"thumb\"\n{options}\n")).err().unwrap();
         for (options, what) in [
@@ -255,7 +340,11 @@ mod tests {
                 "seconds = 3",
                 "patch thumb of skins/hand.toml: seconds is of the program as a whole: give --seconds on the command line",
             ),
-            ("sceen = \"ring\"", "unexpected argument '--sceen'"),
+            ("sceen = \"ring\"", "\"sceen\" is no option of `tactomo live`"),
+            ("\"listen=0.0.0.0:7999\" = true", "\"listen=0.0.0.0:7999\" is no option"),
+            ("\"simulate --record\" = \"a\"", "\"simulate --record\" is no option"),
+            ("\"\" = true", "\"\" is no option"),
+            ("simulate = true\nelf = \"/dev/zero\"", "elf \"/dev/zero\": it is no regular file"),
             ("simulate = true\nforce = \"much\"", "invalid value 'much' for '--force"),
             ("port = 3.5\nsimulate = true", "cannot be used with"),
             ("[[patch]]\nname = \"thumb\"", "another patch has this name"),
@@ -272,6 +361,8 @@ mod tests {
         ] {
             assert!(of(options).contains(what), "{options}: {}", of(options));
         }
+        let many = "[[patch]]\nname = \"a\"\n".repeat(MOST + 1);
+        assert!(read(&many).is_err_and(|error| error.contains("65 patches, and 64")));
         for text in ["", "patch = []", "name = 3", "[[patch]]\nsimulate = true", "\u{0}"] {
             assert!(read(text).is_err_and(|error| error.starts_with("skins/hand.toml is no skin: ")), "{text}");
         }

@@ -1,18 +1,18 @@
 //! What was found, for people, as JSON, CSV or NPZ: the names are those of [`tactomo::schema`].
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Cursor, Write};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use tactomo::detector::short;
 use tactomo::forward::ImageMesh;
 use tactomo::schema::{
-    self, CONTACT_COLUMNS, EVENT_COLUMNS, FRAME_COLUMNS, FrameReport, Kind, SHAPE_COLUMNS, TOTAL_COLUMNS,
+    self, CONTACT_COLUMNS, EVENT_COLUMNS, FRAME_COLUMNS, FrameReport, Kind, Of, SHAPE_COLUMNS, TOTAL_COLUMNS,
 };
 use tactomo::solve::{FoundContact, FoundShape};
 use tactomo::table::{CsvWriter, NpzWriter, Values};
 
-use super::{Args, Reader};
+use super::Args;
 use tactomo_cli::output::{NewFile, unless_closed};
 
 /// Where frames go.
@@ -42,7 +42,7 @@ enum Form {
 /// Columns of an NPZ file, gathered until its end.
 #[derive(Default)]
 struct Arrays {
-    frames: [Vec<f64>; FRAME_COLUMNS.len()],
+    frames: Frames,
     /// Of each frame, whether it has a shape or not.
     totals: [Vec<f64>; TOTAL_COLUMNS.len()],
     shapes: [Vec<f64>; SHAPE_COLUMNS.len()],
@@ -60,9 +60,47 @@ struct Arrays {
     readings: [Vec<f64>; 3],
 }
 
+/// The figures of frames, each in its own kind.
+struct Frames([FrameValues; FRAME_COLUMNS.len()]);
+
+/// A figure of frames, and how it is got of one. What is not known is -1 of an integer, false of a flag and NaN of a number.
+enum FrameValues {
+    Integers(fn(&FrameReport) -> Option<u64>, Vec<i64>),
+    Flags(fn(&FrameReport) -> Option<bool>, Vec<bool>),
+    Numbers(fn(&FrameReport) -> Option<f64>, Vec<f64>),
+}
+
+impl Default for Frames {
+    fn default() -> Self {
+        Self(FRAME_COLUMNS.each_ref().map(|column| match column.of {
+            Of::Integer(of) => FrameValues::Integers(of, Vec::new()),
+            Of::Flag(of) => FrameValues::Flags(of, Vec::new()),
+            Of::Number(of) => FrameValues::Numbers(of, Vec::new()),
+        }))
+    }
+}
+
+impl FrameValues {
+    fn push(&mut self, frame: &FrameReport) {
+        match self {
+            Self::Integers(of, values) => values.push(of(frame).and_then(|value| value.try_into().ok()).unwrap_or(-1)),
+            Self::Flags(of, values) => values.push(of(frame).unwrap_or_default()),
+            Self::Numbers(of, values) => values.push(of(frame).unwrap_or(f64::NAN)),
+        }
+    }
+
+    fn values(&self) -> (usize, Values<'_>) {
+        match self {
+            Self::Integers(_, values) => (values.len(), Values::Integers(values)),
+            Self::Flags(_, values) => (values.len(), Values::Flags(values)),
+            Self::Numbers(_, values) => (values.len(), Values::Numbers(values)),
+        }
+    }
+}
+
 impl Writer {
     /// To the file that is wanted, whose name chooses the form, or to stdout.
-    pub fn new(args: &Args, reader: &Reader) -> anyhow::Result<Self> {
+    pub fn new(args: &Args) -> anyhow::Result<Self> {
         let Some(path) = args.out.as_deref() else {
             let out = Box::new(BufWriter::new(io::stdout()));
             return Ok(Self { form: if args.json { Form::Json(out) } else { Form::People(out) }, file: None });
@@ -76,7 +114,7 @@ impl Writer {
             "csv" => FileForm::Csv,
             _ => FileForm::JsonLines,
         };
-        Self::to_file(form, NewFile::beside(reader.path(), path, args.overwrite)?)
+        Self::to_file(form, NewFile::new(path)?)
     }
 
     /// To a file of such a form.
@@ -85,7 +123,7 @@ impl Writer {
             FileForm::Npz => Form::Npz(Box::default()),
             FileForm::Csv => {
                 let mut table = CsvWriter::new(file.create()?);
-                table.row(schema::csv_heads())?;
+                table.row(schema::csv_heads()).map_err(|error| file.failed(error))?;
                 Form::Csv(Box::new(table))
             }
             FileForm::JsonLines => Form::Json(Box::new(file.create()?)),
@@ -104,19 +142,27 @@ impl Writer {
                 Ok(())
             }
         };
-        Ok(unless_closed(written)?)
+        unless_closed(written).map_err(|error| self.failed(error))
+    }
+
+    /// Why no more can be written, as the system says it.
+    fn failed(&self, error: io::Error) -> anyhow::Error {
+        match &self.file {
+            Some(file) => file.failed(error).into(),
+            None => anyhow::Error::new(error).context("cannot write to stdout"),
+        }
     }
 
     /// Writes what is left.
-    pub fn finish(self, mesh: Option<&ImageMesh>) -> anyhow::Result<()> {
-        let written = match (self.form, &self.file) {
-            (Form::People(mut out) | Form::Json(mut out), _) => out.flush(),
-            (Form::Csv(table), _) => table.finish(),
+    pub fn finish(mut self, mesh: Option<&ImageMesh>) -> anyhow::Result<()> {
+        let written = match (&mut self.form, &self.file) {
+            (Form::People(out) | Form::Json(out), _) => out.flush(),
+            (Form::Csv(table), _) => table.flush(),
             (Form::Npz(arrays), Some(file)) => arrays.write(file.create()?, mesh),
             (Form::Npz(_), None) => Ok(()),
         };
-        unless_closed(written).context("cannot write what was found")?;
-        self.file.map_or(Ok(()), NewFile::finish)
+        unless_closed(written).map_err(|error| self.failed(error))?;
+        Ok(self.file.map_or(Ok(()), NewFile::finish)?)
     }
 }
 
@@ -166,9 +212,7 @@ fn shape_sentence(shape: &FoundShape) -> String {
 impl Arrays {
     fn push(&mut self, frame: &FrameReport) {
         let number = frame.frame.map_or(f64::NAN, |frame| frame as f64);
-        for (column, values) in FRAME_COLUMNS.iter().zip(&mut self.frames) {
-            values.push(column.value(frame).unwrap_or(f64::NAN));
-        }
+        self.frames.0.iter_mut().for_each(|values| values.push(frame));
         for (column, values) in TOTAL_COLUMNS.iter().zip(&mut self.totals) {
             values.push(frame.total.and_then(|total| column.value(&total)).unwrap_or(f64::NAN));
         }
@@ -199,10 +243,13 @@ impl Arrays {
         }
     }
 
-    fn write(&self, out: BufWriter<File>, mesh: Option<&ImageMesh>) -> io::Result<()> {
-        let mut writer = NpzWriter::new(out);
-        for (frame, values) in FRAME_COLUMNS.iter().zip(&self.frames) {
-            column(&mut writer, frame.name, frame.kind, values)?;
+    fn write(&self, mut out: BufWriter<File>, mesh: Option<&ImageMesh>) -> io::Result<()> {
+        // In memory, as the arrays are: an archive that cannot be ended says so on stderr by itself.
+        let mut bytes = Vec::new();
+        let mut writer = NpzWriter::new(Cursor::new(&mut bytes));
+        for (frame, values) in FRAME_COLUMNS.iter().zip(&self.frames.0) {
+            let (count, values) = values.values();
+            writer.add_values(frame.name, &[count], values)?;
         }
         for (total, values) in TOTAL_COLUMNS.iter().zip(&self.totals) {
             column(&mut writer, total.name, Kind::Number, values)?;
@@ -232,12 +279,14 @@ impl Arrays {
                 writer.add(name, &shape, readings)?;
             }
         }
-        writer.finish()
+        writer.finish()?;
+        out.write_all(&bytes)?;
+        out.flush()
     }
 }
 
 /// Adds a column in its kind; what is not known is -1 of an integer and false of a flag.
-fn column(writer: &mut NpzWriter<BufWriter<File>>, name: &str, kind: Kind, values: &[f64]) -> io::Result<()> {
+fn column(writer: &mut NpzWriter<Cursor<&mut Vec<u8>>>, name: &str, kind: Kind, values: &[f64]) -> io::Result<()> {
     let shape = [values.len()];
     match kind {
         Kind::Number => writer.add(name, &shape, values),

@@ -1,11 +1,15 @@
 //! Recordings of several boards in a folder, cut and joined as one.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use tactomo::board::record::{RecordReader, edit};
+use tactomo::new_file::NewFileError;
+
+use crate::commands::live::skin;
 
 /// What a recording's file ends in.
 pub const EXTENSION: &str = "tactomo";
@@ -29,7 +33,21 @@ pub fn recordings(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     files.retain(|file| file.extension().is_some_and(|extension| extension == EXTENSION));
     files.sort();
     ensure!(!files.is_empty(), "{} has no recordings", folder.display());
+    for file in &files {
+        check_own(file).with_context(|| format!("cannot read {}", file.display()))?;
+    }
     Ok(files)
+}
+
+/// Checks that something in a folder is a file of its own: a link could have anything read, and a pipe be waited for.
+pub fn check_own(path: &Path) -> io::Result<()> {
+    let kind = path.symlink_metadata()?.file_type();
+    let refused = |what| Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+    match kind.is_symlink() {
+        true => refused("it is a link, and only files of the folder itself are read: copy it there"),
+        false if !kind.is_file() => refused("it is no regular file"),
+        false => Ok(()),
+    }
 }
 
 /// What the detector of a recording in a folder is called: as its file, without what that ends in.
@@ -72,13 +90,26 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> anyhow::Result<Vec<PathBuf>> {
     joined.collect()
 }
 
+/// Makes a new folder.
+///
+/// # Errors
+/// As of a new file, if it is there already or cannot be made.
+pub fn make(folder: &Path) -> Result<(), NewFileError> {
+    fs::create_dir(folder).map_err(|source| NewFileError::of(folder, source))
+}
+
 /// Makes a folder for recordings that are shown together as those of `like` are.
 fn begin(like: &Path, out: &Path) -> anyhow::Result<()> {
-    fs::create_dir(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
     let skin = like.join(SKIN);
-    if skin.is_file() {
+    let read = || check_own(&skin).and_then(|()| skin::FORMAT.read_text(&skin));
+    let text = match read() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+        read => Some(read.with_context(|| format!("cannot copy {}", skin.display()))?),
+    };
+    make(out)?;
+    if let Some(text) = text {
         let to = out.join(SKIN);
-        fs::copy(&skin, &to).with_context(|| format!("cannot copy {} to {}", skin.display(), to.display()))?;
+        fs::write(&to, text).with_context(|| format!("cannot write {}", to.display()))?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::ensure;
 use serde::Serialize;
 use tactomo::board::frames::{RecordingLoss, Survey};
 use tactomo::board::record::Note;
@@ -86,10 +86,10 @@ fn sum(file: &Path, survey: &Survey) -> String {
     format!("{}: {} frames in {:.3} s; {}", file.display(), survey.frames, survey.seconds, lost(&survey.loss))
 }
 
-/// What is lost, and where frames were lost that are missing in a file that is whole.
+/// What is lost, and where it was lost that is missing in a file that is whole.
 fn lost(loss: &RecordingLoss) -> String {
-    let before = loss.missing_frames > 0 && !loss.is_damage();
-    format!("{loss}{}", if before { ", lost on the line; the file is whole" } else { "" })
+    let on_line = (loss.missing_frames > 0 || loss.corrupt > 0) && !loss.is_damage();
+    format!("{loss}{}", if on_line { ", lost on the line; the file is whole" } else { "" })
 }
 
 fn in_words(info: &Info, survey: &Survey) -> String {
@@ -126,12 +126,12 @@ fn in_words(info: &Info, survey: &Survey) -> String {
     lines.join("\n")
 }
 
-/// Prints what is damaged in each recording.
+/// Prints what is damaged or missing in each recording.
 ///
 /// # Errors
-/// How many are damaged, if any is, or cannot be read.
+/// How many files are damaged, and how many cannot be read, if any.
 pub fn check(files: &[PathBuf]) -> anyhow::Result<()> {
-    let mut damaged = 0;
+    let (mut damaged, mut unread) = (0, 0);
     for file in files {
         let line = match Survey::of(file) {
             Ok(survey) => {
@@ -139,16 +139,17 @@ pub fn check(files: &[PathBuf]) -> anyhow::Result<()> {
                 sum(file, &survey)
             }
             Err(error) => {
-                damaged += 1;
+                unread += 1;
                 with_causes(&error)
             }
         };
         output::print(&line)?;
     }
-    match damaged {
-        0 => Ok(()),
-        1 if files.len() == 1 => bail!("the recording is damaged"),
-        1 => bail!("one of {} recordings is damaged", files.len()),
-        _ => bail!("{damaged} of {} recordings are damaged", files.len()),
-    }
+    let of_all = |count: usize, what: [&str; 2]| {
+        (count > 0).then(|| format!("{count} of {} {}", files.len(), what[usize::from(count > 1)]))
+    };
+    let wrong = [of_all(damaged, ["is damaged", "are damaged"]), of_all(unread, ["cannot be read"; 2])];
+    let wrong: Vec<_> = wrong.into_iter().flatten().collect();
+    ensure!(wrong.is_empty(), "of the recordings, {}", wrong.join(", and "));
+    Ok(())
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::ensure;
 use tactomo::board::record::edit;
 
+use tactomo_cli::options;
 use tactomo_cli::output::message;
 
 /// Looks into recordings, cuts pieces out of them and joins them.
@@ -36,7 +37,8 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Reads recordings from end to end and says what is damaged or missing, in frames and seconds; exit code 1 if a file is damaged
+    /// Reads recordings from end to end and says what is damaged or missing, in frames and seconds; exit code 1 if a file is damaged or cannot be read.
+    /// What was lost on the line damages no file
     Check {
         /// The recordings
         #[arg(value_name = "FILE", required = true)]
@@ -48,10 +50,10 @@ enum Command {
         #[arg(value_name = "FILE")]
         file: PathBuf,
         /// Start of the piece, in seconds since the recording's start [default: the start]
-        #[arg(long, value_name = "SECONDS", value_parser = time_s)]
+        #[arg(long, value_name = "SECONDS", value_parser = options::time_s())]
         from: Option<f64>,
         /// Its end [default: the end]
-        #[arg(long, value_name = "SECONDS", value_parser = time_s)]
+        #[arg(long, value_name = "SECONDS", value_parser = options::time_s())]
         to: Option<f64>,
         /// The new recording
         #[arg(long, value_name = "FILE")]
@@ -76,7 +78,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Command::Cut { file, from, to, out } => {
             let (from, to) = (from.unwrap_or(0.0), to.unwrap_or(f64::MAX));
             ensure!(from < to, "--from {from} has to be before --to {to}");
-            is_new(out)?;
             if file.is_dir() {
                 return all_made(&folder::cut(file, from, to, out)?);
             }
@@ -84,7 +85,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             made(out)
         }
         Command::Merge { files, out } => {
-            is_new(out)?;
             if files.iter().all(|file| file.is_dir()) {
                 return all_made(&folder::merge(files, out)?);
             }
@@ -94,11 +94,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-fn is_new(out: &Path) -> anyhow::Result<()> {
-    ensure!(!out.exists(), "{} exists already, and no recording is replaced: give another name", out.display());
-    Ok(())
-}
-
 fn all_made(out: &[PathBuf]) -> anyhow::Result<()> {
     out.iter().try_for_each(|out| made(out))
 }
@@ -106,9 +101,4 @@ fn all_made(out: &[PathBuf]) -> anyhow::Result<()> {
 fn made(out: &Path) -> anyhow::Result<()> {
     message!("{}", info::line(out)?);
     Ok(())
-}
-
-fn time_s(text: &str) -> Result<f64, String> {
-    let time_s = text.parse::<f64>().ok().filter(|time_s| *time_s >= 0.0 && time_s.is_finite());
-    time_s.ok_or_else(|| "a number of seconds, 0 or more".to_owned())
 }

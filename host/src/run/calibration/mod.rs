@@ -16,6 +16,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 
+use tactomo_board::identity::Sensor;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Calibration as Calibrated, Detector};
 use tactomo_touch::calibrate::Rub;
@@ -23,7 +24,7 @@ use tactomo_touch::solve::FoundContact;
 
 pub use self::collected::Coverage;
 pub use self::guide::Target;
-pub use self::learning::Learning;
+pub use self::learning::{Keeping, Kept, Learning};
 pub use self::messages::Calibrate;
 pub(super) use self::messages::Outcome;
 use self::session::RubSession;
@@ -96,6 +97,16 @@ impl fmt::Display for LearnedInUse {
     }
 }
 
+/// What is to be used on a sensor that is connected.
+pub(super) enum Meeting {
+    /// What is in use.
+    AsBefore,
+    /// What was learned of it before.
+    Known(Arc<Detector>),
+    /// Its description: what is in use was learned of another.
+    Unknown(Arc<Detector>),
+}
+
 /// The calibration of the detector that is connected, in the follower, and what is shown of it.
 pub(super) struct Calibration {
     inbox: Arc<Inbox>,
@@ -104,6 +115,8 @@ pub(super) struct Calibration {
     folder: PathBuf,
     /// How the detector is learned unasked, if it is.
     learning: Option<Learning>,
+    /// The sensor that is connected, once its board has said Hello.
+    sensor: Option<Sensor>,
     session: Option<RubSession>,
     /// How many there have been.
     begun: u64,
@@ -116,7 +129,7 @@ pub(super) struct Calibration {
 impl Calibration {
     /// None yet; what comes of them in other threads goes through `inbox`.
     pub fn new(inbox: Arc<Inbox>, notice: Arc<NoticeBoard>, folder: PathBuf, learning: Option<Learning>) -> Self {
-        Self { inbox, notice, folder, learning, session: None, begun: 0, used: None, learned: None }
+        Self { inbox, notice, folder, learning, sensor: None, session: None, begun: 0, used: None, learned: None }
     }
 
     /// Begins with a board's detector: frames before were those of another, or of other settings of its converter.
@@ -124,19 +137,40 @@ impl Calibration {
         self.begun += 1;
         let ends = (Arc::clone(&self.inbox), Arc::clone(&self.notice));
         let described = self.learning.as_ref().map(|learning| Arc::new(learning.description.measured_as(&detector)));
-        // The run began with what was kept by one before.
-        if self.used.is_none()
-            && described.is_some()
-            && let Some(calibration) = &detector.calibration
-        {
-            (self.used, self.learned) = (Some(Arc::clone(&detector)), Some(LearnedInUse::of(calibration)));
-        }
         let learns = described.is_some();
         let description = described.unwrap_or(detector);
         let mut session = RubSession::new(self.begun, description, learns, self.folder.clone(), ends);
         session.set_used(self.used.clone());
         self.session = Some(session);
         self.show();
+    }
+
+    /// Takes note of the sensor that is connected: what was learned belongs to it alone.
+    pub fn meet(&mut self, sensor: Sensor) -> Meeting {
+        let before = self.sensor.replace(sensor);
+        let (Some(learning), Some(sensor)) = (&self.learning, &self.sensor) else { return Meeting::AsBefore };
+        if before.as_ref() == Some(sensor) {
+            return Meeting::AsBefore;
+        }
+        let (kept, refused) = learning.kept(sensor);
+        refused.iter().for_each(|why| tracing::warn!("{why}"));
+        let description = self.session.as_ref().map(|session| Arc::clone(&session.description));
+        let Some(description) = description else { return Meeting::AsBefore };
+        if before.is_some() {
+            // Presses so far were on another.
+            let was_learned = self.learned.take().is_some();
+            self.used.take_if(|_| was_learned);
+            self.begin_with(Arc::clone(&description));
+            if was_learned && kept.is_none() {
+                return Meeting::Unknown(description);
+            }
+        }
+        let Some(Kept { file, detector }) = kept else { return Meeting::AsBefore };
+        tracing::info!("what was learned before of this sensor is used: {}", file.display());
+        let used = Arc::new(detector.measured_as(&description));
+        (self.learned, self.used) = (detector.calibration.as_ref().map(LearnedInUse::of), Some(Arc::clone(&used)));
+        self.session.iter_mut().for_each(|session| session.set_used(self.used.clone()));
+        Meeting::Known(used)
     }
 
     /// Does what a person asks; the detector to go on with, if one is to be.
@@ -163,9 +197,13 @@ impl Calibration {
 
     /// Keeps what was learned for the next run, if it is to be: nobody waits for a disk.
     fn keep(&self, learned: &Arc<Detector>) {
-        let Some(path) = self.learning.as_ref().and_then(|learning| learning.file.clone()) else { return };
+        let (Some(learning), Some(sensor)) = (self.learning.clone(), self.sensor.clone()) else { return };
         let learned = Arc::clone(learned);
-        let write = move || learning::keep(&learned, &path).unwrap_or_else(|why| tracing::warn!("{why}"));
+        let write = move || match learning.keep(&learned, &sensor) {
+            Ok(Some(file)) => tracing::debug!("what was learned is kept in {}", file.display()),
+            Ok(None) => {}
+            Err(why) => tracing::warn!("{why}"),
+        };
         if let Err(error) = thread::Builder::new().name("learned file".to_owned()).spawn(write) {
             tracing::warn!("what was learned is not kept: cannot start a thread: {}", with_causes(&error));
         }
@@ -229,6 +267,38 @@ mod tests {
     fn shown(notice: &NoticeBoard, shown: &watch::Receiver<Arc<Snapshot>>) -> Option<Stage> {
         notice.publish(|_| {});
         shown.borrow().calibrating.as_ref().map(|calibrating| calibrating.stage)
+    }
+
+    #[test]
+    fn what_was_learned_is_used_on_its_sensor_alone() {
+        let folder = std::env::temp_dir().join(format!("tactomo-met-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let sensor = |serial: &str| Sensor {
+            board: "test".to_owned(),
+            serial_number: Some(serial.to_owned()),
+            port: "COM3".to_owned(),
+        };
+        let described = Detector::default();
+        let keeping = Keeping::Beside { description: folder.join("mine.toml"), patch: String::new() };
+        let learning = Learning::of(&described, keeping).unwrap();
+        let calibration =
+            Calibrated { board: Some("test".to_owned()), place_error_m: Some(2e-4), ..Calibrated::default() };
+        let mut learned = Detector { calibration: Some(calibration), ..described.clone() };
+        learned.layers[0].thickness_m *= 1.1;
+        learning.keep(&learned, &sensor("A7")).unwrap();
+        let (snapshots, _receiver) = watch::channel(Arc::default());
+        let (inbox, notice) = (Arc::new(Inbox::new(false)), Arc::new(NoticeBoard::new(snapshots)));
+        let mut calibration = Calibration::new(inbox, notice, folder.clone(), Some(learning));
+        calibration.begin_with(Arc::new(described.clone()));
+        let thickness_m = |detector: &Detector| detector.layers[0].thickness_m;
+        for _ in 0..2 {
+            let Meeting::Known(used) = calibration.meet(sensor("A7")) else { panic!("it was learned") };
+            assert_eq!(thickness_m(&used), thickness_m(&learned));
+            assert!(matches!(calibration.meet(sensor("A7")), Meeting::AsBefore), "the board has come back");
+            let Meeting::Unknown(used) = calibration.meet(sensor("B8")) else { panic!("it is another") };
+            assert_eq!((thickness_m(&used), calibration.learned), (thickness_m(&described), None));
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

@@ -46,7 +46,8 @@ pub(super) struct RubSession {
     inbox: Arc<Inbox>,
     notice: Arc<NoticeBoard>,
     folder: PathBuf,
-    description: Arc<Detector>,
+    /// The detector that fits begin from, as the board measures it.
+    pub description: Arc<Detector>,
     /// Cells that have to have frames before the next fit that nobody asks for; `None` if there is to be none.
     learns_from: Option<usize>,
     /// The detector that was found before and is in use, if one is.

@@ -7,7 +7,7 @@ use crate::sink::web::{PLAIN, Response, response};
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
-const SVG: &str = "image/svg+xml";
+pub(super) const SVG: &str = "image/svg+xml";
 
 /// Path, type and contents of a file.
 type Asset = (&'static str, &'static str, &'static str);
@@ -33,12 +33,14 @@ const ASSETS: &[Asset] = &[
     ("/frame.js", SCRIPT, include_str!("web/frame.js")),
     ("/gain.js", SCRIPT, include_str!("web/gain.js")),
     ("/heat.js", SCRIPT, include_str!("web/heat.js")),
+    ("/headline.js", SCRIPT, include_str!("web/headline.js")),
     ("/history.js", SCRIPT, include_str!("web/history.js")),
     ("/layout.js", SCRIPT, include_str!("web/layout.js")),
     ("/link.js", SCRIPT, include_str!("web/link.js")),
     ("/marks.js", SCRIPT, include_str!("web/marks.js")),
     ("/method.js", SCRIPT, include_str!("web/method.js")),
     ("/notice.js", SCRIPT, include_str!("web/notice.js")),
+    ("/overview.js", SCRIPT, include_str!("web/overview.js")),
     ("/palette.js", SCRIPT, include_str!("web/palette.js")),
     ("/picture.js", SCRIPT, include_str!("web/picture.js")),
     ("/pointer.js", SCRIPT, include_str!("web/pointer.js")),
@@ -49,6 +51,7 @@ const ASSETS: &[Asset] = &[
     ("/save.js", SCRIPT, include_str!("web/save.js")),
     ("/scale.js", SCRIPT, include_str!("web/scale.js")),
     ("/shapes.js", SCRIPT, include_str!("web/shapes.js")),
+    ("/share.js", SCRIPT, include_str!("web/share.js")),
     ("/simulation.js", SCRIPT, include_str!("web/simulation.js")),
     ("/solid.js", SCRIPT, include_str!("web/solid.js")),
     ("/space.js", SCRIPT, include_str!("web/space.js")),

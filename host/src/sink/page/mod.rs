@@ -7,6 +7,7 @@
 mod access;
 mod assets;
 mod calibrating;
+pub mod code;
 mod messages;
 mod setup;
 mod socket;
@@ -43,6 +44,9 @@ const PORTS_TRIED: u16 = 10;
 
 /// Pages that may be open at a time.
 const MAX_PAGES: usize = 32;
+
+/// Path of the picture of the page's address.
+const ADDRESS: &str = "/address.svg";
 
 /// Largest message that a page may send, in bytes.
 const MAX_PAGE_MESSAGE: usize = 2048;
@@ -137,6 +141,7 @@ pub struct Server {
     at: SocketAddr,
     /// The token and a slash, if there is one.
     prefix: String,
+    shared_url: Option<String>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -203,6 +208,8 @@ struct Shared {
     pictures: Vec<Arc<Picture>>,
     pages: Arc<Semaphore>,
     access: Access,
+    /// The address for other machines, if it is shared.
+    shared_url: Option<String>,
     door: Door,
 }
 
@@ -221,18 +228,19 @@ impl Server {
             None => Access::local(at.port()),
         };
         let prefix = access.prefix();
+        let shared_url = shared_url(at, &prefix);
         let picture = |shown: Shown| {
             let name = || shown.setup.detector.name.clone();
-            let setup_message = setup::message(&shown.setup, (&shown.name, shown.place))
+            let setup_message = setup::message(&shown.setup, (&shown.name, shown.place), shared_url.as_deref())
                 .map_err(|source| ServerError::PageSetup { detector: name(), source })?;
             Ok(Arc::new(Picture { shown, setup_message, rezeros: AtomicU64::new(0), door: listen.door.clone() }))
         };
         let pictures: Vec<_> = all.into_iter().map(picture).collect::<Result<_, _>>()?;
         let pages = Arc::new(Semaphore::new(MAX_PAGES * pictures.len()));
-        let shared = Arc::new(Shared { pictures, pages, access, door: listen.door });
+        let shared = Arc::new(Shared { pictures, pages, access, shared_url: shared_url.clone(), door: listen.door });
         let (stop, stopped) = oneshot::channel();
         let thread = run(listener, shared, stopped).map_err(refused)?;
-        Ok(Self { at, prefix, stop: Some(stop), thread: Some(thread) })
+        Ok(Self { at, prefix, shared_url, stop: Some(stop), thread: Some(thread) })
     }
 
     /// Where the page is for a browser on this machine, with its token if it has one.
@@ -242,13 +250,12 @@ impl Server {
     }
 
     /// Where the page is for other machines, with its token; `None` if it is for this machine alone.
-    pub fn shared_url(&self) -> Option<String> {
-        let outward = || if self.at.ip().is_unspecified() { own_address() } else { Some(self.at.ip()) };
-        (!self.prefix.is_empty()).then(outward).flatten().map(|ip| self.url_at(ip))
+    pub fn shared_url(&self) -> Option<&str> {
+        self.shared_url.as_deref()
     }
 
     fn url_at(&self, ip: IpAddr) -> String {
-        format!("http://{}/{}", SocketAddr::new(ip, self.at.port()), self.prefix)
+        url(ip, self.at.port(), &self.prefix)
     }
 
     /// The port it listens on.
@@ -265,6 +272,16 @@ impl Drop for Server {
             let _ = thread.join();
         }
     }
+}
+
+fn url(ip: IpAddr, port: u16, prefix: &str) -> String {
+    format!("http://{}/{prefix}", SocketAddr::new(ip, port))
+}
+
+/// Where the page of a server at `at` is for other machines, behind its token; `None` if it has none, and so is for this machine alone.
+fn shared_url(at: SocketAddr, prefix: &str) -> Option<String> {
+    let outward = || if at.ip().is_unspecified() { own_address() } else { Some(at.ip()) };
+    (!prefix.is_empty()).then(outward).flatten().map(|ip| url(ip, at.port(), prefix))
 }
 
 /// The address that other machines on the network know this one by, if it is on one.
@@ -345,6 +362,7 @@ fn answer(shared: &Arc<Shared>, request: &mut web::Request, host: &str) -> Respo
                     (Some(_), None) => redirect(&format!("{whole}/")),
                     (Some(picture), Some(rest)) => page(shared, picture, request, (&format!("/{rest}"), host)),
                     (None, _) if path == "/detectors.json" => names(all),
+                    (None, _) if path == ADDRESS => address(shared),
                     (None, _) => assets::of_all(path),
                 }
             }
@@ -361,7 +379,16 @@ fn page(
 ) -> Response {
     match path {
         "/socket" => open_socket(shared, picture, request, host),
+        ADDRESS => address(shared),
         path => assets::answer(path),
+    }
+}
+
+/// The address for other machines as a picture.
+fn address(shared: &Shared) -> Response {
+    match &shared.shared_url {
+        Some(url) => response(StatusCode::OK, assets::SVG, &code::svg(url)),
+        None => response(StatusCode::NOT_FOUND, PLAIN, ""),
     }
 }
 

@@ -35,6 +35,8 @@ struct SetupMessage<'a> {
     scenes: Vec<SceneMessage>,
     source: &'a str,
     simulated: bool,
+    /// The address for other machines; none if the page is for this machine alone.
+    shared: Option<&'a str>,
 }
 
 /// Where the detector's frame is on the body.
@@ -66,8 +68,12 @@ struct ElectrodeMessage {
     place_m: [f64; 3],
 }
 
-/// The `setup` message of a detector by its name among several, and at its place on a body.
-pub(super) fn message(setup: &PageSetup, (name, place): (&str, Option<Place>)) -> serde_json::Result<String> {
+/// The `setup` message of a detector by its name among several, and at its place on a body, on a page that other machines have at `shared_url`.
+pub(super) fn message(
+    setup: &PageSetup,
+    (name, place): (&str, Option<Place>),
+    shared_url: Option<&str>,
+) -> serde_json::Result<String> {
     let detector = &setup.detector;
     let loops = std::iter::once(&detector.outline.outer).chain(&detector.outline.holes);
     let (triangles, torn_triangles) = drawn_triangles(setup);
@@ -91,6 +97,7 @@ pub(super) fn message(setup: &PageSetup, (name, place): (&str, Option<Place>)) -
         scenes: scenes(setup),
         source: &setup.source,
         simulated: setup.finger.is_some(),
+        shared: shared_url,
     })
 }
 
@@ -153,7 +160,7 @@ mod tests {
 
     #[test]
     fn the_setup_says_what_the_page_needs() {
-        let value = json(message(&small_setup(), ("", None)));
+        let value = json(message(&small_setup(), ("", None), None));
         assert_eq!(value["type"], "setup");
         assert_eq!(value["electrodes"].as_array().map(Vec::len), Some(16));
         assert_eq!(value["source"], "a \"quoted\" port");
@@ -174,7 +181,7 @@ mod tests {
         let detector = Detector::read(file.as_ref()).expect("an example");
         let model = tactomo_physics::forward::Auto::new(&detector, None).expect("a model").model;
         let mesh = model.image_mesh().clone();
-        let value = json(message(&PageSetup { detector, mesh: mesh.clone(), ..small_setup() }, ("", None)));
+        let value = json(message(&PageSetup { detector, mesh: mesh.clone(), ..small_setup() }, ("", None), None));
         let count = |name: &str| value[name].as_array().map_or(0, Vec::len);
         assert_eq!(count("places_m"), mesh.nodes_m.len());
         assert_eq!(count("triangles") + count("torn_triangles"), mesh.triangles.len());
@@ -183,10 +190,10 @@ mod tests {
 
     #[test]
     fn a_place_comes_as_an_origin_and_axes() {
-        assert!(json(message(&small_setup(), ("thumb", None)))["place"].is_null());
+        assert!(json(message(&small_setup(), ("thumb", None), None))["place"].is_null());
         let place = Place { xyz_m: [0.1, 0.0, -0.02], rpy_rad: [0.0; 3] };
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let value = json(message(&small_setup(), ("thumb", Some(place))));
+        let value = json(message(&small_setup(), ("thumb", Some(place)), None));
         assert_eq!(value["place"], serde_json::json!({ "origin_m": [0.1, 0.0, -0.02], "axes": axes }));
     }
 }

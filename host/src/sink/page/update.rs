@@ -72,7 +72,7 @@ const WORDS: [Named<u32>; 8] = [
 
 /// Residual of the readings: root mean square, in standard deviations of the noise. How sure the number of contacts is, and the likeliest other one. Age of the answer when this is sent: since the last byte of
 /// its frame came. What all that touches comes to, and its middle on the map. The pointer: sum of its motion, 1 while it is pressed, clicks so far; not numbers if no contact is one.
-const NUMBERS: [Named<f32>; 12] = [
+const NUMBERS: [Named<f32>; 14] = [
     named("residual", |shown| known(shown.answer.solution.residual)),
     named("certainty", |shown| known(shown.answer.solution.certainty)),
     named("other_contacts", |shown| {
@@ -87,6 +87,8 @@ const NUMBERS: [Named<f32>; 12] = [
     named("pointer_y_m", |shown| pointer(shown, |state| state.way_m[1])),
     named("pointer_pressed", |shown| pointer(shown, |state| f64::from(u8::from(state.is_pressed)))),
     named("pointer_clicks", |shown| pointer(shown, |state| state.clicks as f64)),
+    named("floor_v", |shown| known(shown.answer.beneath.map(|beneath| beneath.floor_v))),
+    named("above_floor", |shown| known(shown.answer.beneath.map(|beneath| f64::from(u8::from(beneath.is_pressed))))),
 ];
 
 /// The image: contact conductance per area at each node, none if the solver makes no image. The readings as measured, electrode `e` under ground
@@ -248,23 +250,24 @@ mod tests {
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
         assert_eq!(words(&bytes[..48]), [9, 300, 2500, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 3, 4, 2, 2]);
-        let head = floats(&bytes[48..132]);
+        let head = floats(&bytes[48..140]);
         assert_eq!(head[..3], [1.25, 0.75, 3.0]);
         assert!((0.0..5.0).contains(&head[3]), "{} s old", head[3]);
         assert!(head[4].is_nan(), "not all newtons are known");
         assert_eq!(head[5], 4.75, "the sum");
         assert!((head[6] - (1.75 * 0.25 + 3.0) / 4.75).abs() < 1e-6 && (head[7] - 5.125 / 4.75).abs() < 1e-6);
         assert_eq!(head[8..12], [0.5, -0.25, 1.0, 3.0], "the pointer");
-        assert_eq!(head[12..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
-        assert_eq!(words(&bytes[132..136]), [6]);
+        assert!(head[12].is_nan() && head[13].is_nan(), "something is found");
+        assert_eq!(head[14..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
+        assert_eq!(words(&bytes[140..144]), [6]);
         let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.125];
         let known = [&known[..], &[7.068_583_5, 1.0, 0.5, 0.25, 0.0, 0.25, -0.5]].concat();
-        assert_eq!(floats(&bytes[136..220]), known);
-        assert_eq!(words(&bytes[220..224]), [0]);
-        assert_eq!(floats(&bytes[224..240]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[240..300]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[300..308]), [1.0, 2.0]);
-        assert_eq!(&bytes[308..], "2 contacts\nµ".as_bytes());
+        assert_eq!(floats(&bytes[144..228]), known);
+        assert_eq!(words(&bytes[228..232]), [0]);
+        assert_eq!(floats(&bytes[232..248]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[248..308]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[308..316]), [1.0, 2.0]);
+        assert_eq!(&bytes[316..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -277,7 +280,7 @@ mod tests {
             ..Solution::default()
         });
         assert_eq!((words(&bytes[16..20]), words(&bytes[44..48])), (vec![2], vec![1]));
-        let shape = floats(&bytes[96 + 4 * 6 + 88..]);
+        let shape = floats(&bytes[104 + 4 * 6 + 88..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }
@@ -287,7 +290,7 @@ mod tests {
         let bytes = bytes_of(Solution::default());
         assert_eq!(words(&bytes[..48]), [9, 300, 2500, 2, 0, 0, 0, 0, 0, 4, 2, 0]);
         assert!(floats(&bytes[48..52])[0].is_nan());
-        assert_eq!(bytes.len(), 96 + 4 * 6);
+        assert_eq!(bytes.len(), 104 + 4 * 6);
     }
 
     /// Words of the page's script that stand behind one of these.

@@ -34,6 +34,7 @@ struct StatusMessage<'a> {
     marks: u64,
     refused: Option<&'a str>,
     baseline: Option<&'a str>,
+    wires: Option<&'static str>,
     calibration: Option<&'a str>,
     /// What was learned of the detector, as a part of a sentence.
     learned: Option<String>,
@@ -152,6 +153,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         marks: snapshot.marks,
         refused: snapshot.refused.first(),
         baseline: snapshot.baseline.as_deref(),
+        wires: snapshot.wires,
         calibration: snapshot.calibration.as_deref(),
         learned: snapshot.learned.map(|learned| learned.to_string()),
         calibrating: snapshot.calibrating.as_deref().map(CalibratingMessage::of),
@@ -247,6 +249,7 @@ mod tests {
             recording: Some("touch.tactomo".into()),
             scan: Scan { choice: ScanChoice::Adaptive, grounds: vec![5, 10], others: true },
             baseline: Some("Something pressed at the start.".to_owned()),
+            wires: Some("Press with one finger."),
             calibration: Some("It was calibrated on another board.".to_owned()),
             ..Snapshot::default()
         };
@@ -262,6 +265,7 @@ mod tests {
         assert_eq!(value["recording"], "touch.tactomo");
         assert_eq!(value["scan"], serde_json::json!({"choice": "adaptive", "grounds": [5, 10], "others": true}));
         assert_eq!(value["baseline"], "Something pressed at the start.");
+        assert_eq!(value["wires"], "Press with one finger.");
         assert_eq!(value["calibration"], "It was calibrated on another board.");
         assert_eq!(value["rezeros"], 3);
     }

@@ -8,18 +8,19 @@ mod container;
 pub(crate) mod kernel;
 pub(crate) mod network;
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+use tactomo_table::file::Format;
 
 pub(crate) use self::container::wrong;
 pub use self::container::{Container, ContainerError};
 use self::kernel::Kernel;
 use self::network::Network;
 
-/// Longest file that is read (bytes).
-const LONGEST: u64 = 1 << 27;
+/// A file of what was learned.
+const FORMAT: Format = Format::new("a file of `tactomo-lab learn`", 1 << 27);
 /// Name of the text that says the kind.
 const KIND: &str = "tactomo";
 /// Name of the text that says the version.
@@ -46,12 +47,6 @@ pub enum LearnedError {
         /// What the system says.
         source: io::Error,
     },
-    /// It is longer than anything that belongs here.
-    #[error("{path} is longer than {} MB: this is no file of `tactomo-lab learn`", LONGEST >> 20)]
-    Long {
-        /// The file.
-        path: PathBuf,
-    },
     /// It holds something else.
     #[error("cannot use {path}")]
     Content {
@@ -76,12 +71,7 @@ impl Learned {
     /// # Errors
     /// Those of [`Learned::read`].
     pub fn read_with_bytes(path: &Path) -> Result<(Self, Vec<u8>), LearnedError> {
-        let read = |source| LearnedError::Read { path: path.to_owned(), source };
-        let mut bytes = Vec::new();
-        File::open(path).map_err(read)?.take(LONGEST + 1).read_to_end(&mut bytes).map_err(read)?;
-        if bytes.len() as u64 > LONGEST {
-            return Err(LearnedError::Long { path: path.to_owned() });
-        }
+        let bytes = FORMAT.read(path).map_err(|source| LearnedError::Read { path: path.to_owned(), source })?;
         let learned = Self::parse(&bytes).map_err(|source| LearnedError::Content { path: path.to_owned(), source })?;
         Ok((learned, bytes))
     }

@@ -33,7 +33,7 @@ pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
     let shape = SHAPE_COLUMNS.iter().map(|column| Kind::Number.text(frame.shape.and_then(|shape| column.value(shape))));
     let total =
         TOTAL_COLUMNS.iter().map(|column| Kind::Number.text(frame.total.and_then(|total| column.value(&total))));
-    let own = FRAME_COLUMNS.iter().map(|column| column.kind.text(column.value(frame)));
+    let own = FRAME_COLUMNS.iter().map(|column| column.text(frame));
     let start: Vec<_> = own.chain(total).chain(shape).collect();
     let end = texts(frame);
     let row = |contact: Option<(usize, &FoundContact)>| {

@@ -48,7 +48,7 @@ pub(crate) use self::health::electrodes::{Pair as PairOfLoads, loads};
 pub use self::health::watch::{ElectrodeWatch, FaultyElectrodes, Look};
 pub use self::methods::auto::Auto;
 pub use self::methods::comparisons::{Bsbl, Nonnegative, Tv};
-pub use self::methods::compiled::{CompileError, Compiled, add_newtons, compile};
+pub use self::methods::compiled::{CompileError, Compiled, CompiledTable, TableFileError, add_newtons, compile};
 pub use self::methods::contacts::{ContactSettings, Contacts, contact_over_needed};
 pub use self::methods::image::{Nonlinear, NonlinearSettings};
 pub use self::methods::kernel::KernelSolver;

@@ -2,7 +2,7 @@
 
 use tactomo_study::view::MM;
 
-use super::super::claim::{Basis, Trend, Verdict};
+use super::super::claim::{Basis, Found, Trend, Verdict};
 use super::super::rank::spearman;
 use super::{Claim, GRIDS, Glue, Row};
 
@@ -26,14 +26,16 @@ pub(super) fn of(rows: &[Row]) -> Vec<Claim> {
         });
         let each: Vec<f64> = pairs.iter().filter_map(|pairs| spearman(pairs)).collect();
         let conditions = pairs.iter().map(Vec::len).sum();
-        Trend { of: of.to_owned(), correlation: super::super::rank::mean(&each), conditions }
+        Trend { of: of.to_owned(), correlation: super::super::rank::mean(&each), conditions }.found()
     };
     vec![
-        Claim::of_trends(
+        Claim::new(
             "wider dots lower the error of places",
             Basis::Solver,
-            &trend("error with diameter, reversed, mean of both grids", ERRORS[0]),
-            &trend("standard error with diameter, reversed, mean of both grids", ERRORS[1]),
+            [
+                trend("error with diameter, reversed, mean of both grids", ERRORS[0]),
+                trend("standard error with diameter, reversed, mean of both grids", ERRORS[1]),
+            ],
         ),
         more_dots(rows),
         peak(rows),
@@ -47,26 +49,21 @@ pub(super) fn series(rows: &[Row], dots: usize, glue: Glue) -> impl Iterator<Ite
 
 /// Dots of the same share of the pitch cover the same area: only their number differs.
 fn more_dots(rows: &[Row]) -> Claim {
-    let found = ERRORS.map(|error| {
+    let found = |what: &str, error: fn(&Row) -> Option<f64>| {
         let pairs = series(rows, GRIDS[0], Glue::Conducting).zip(series(rows, GRIDS[1], Glue::Conducting));
         let lower: Vec<bool> = pairs.filter_map(|(few, many)| Some(error(many)? < error(few)?)).collect();
-        (!lower.is_empty()).then(|| lower.iter().filter(|lower| **lower).count() as f64 / lower.len() as f64)
-    });
-    let text = |what: &str, share: Option<f64>| {
-        share.map_or("not computed".to_owned(), |share| {
-            format!(
-                "{what} is lower with 7 x 7 than with 5 x 5 of the same area in {:.0} % of diameters",
-                100.0 * share
-            )
-        })
+        let [yes, all] = [lower.iter().filter(|lower| **lower).count(), lower.len()];
+        let share = 100.0 * yes as f64 / all as f64;
+        let text = match all {
+            0 => "not computed".to_owned(),
+            _ => format!(
+                "{what} is lower with 7 x 7 than with 5 x 5 of the same area in {share:.0} % of {all} diameters"
+            ),
+        };
+        Found::new(Verdict::of_share(yes, all), text)
     };
-    Claim {
-        claim: "more dots lower the error of places",
-        basis: Basis::Solver,
-        verdict: Verdict::of(found[0].map(|share| share > 0.5), found[1].map(|share| share > 0.5)),
-        paper: text("the error", found[0]),
-        sensor: text("the standard error", found[1]),
-    }
+    let found = [found("the error", ERRORS[0]), found("the standard error", ERRORS[1])];
+    Claim::new("more dots lower the error of places", Basis::Solver, found)
 }
 
 /// Where the error of a grid, over the diameter, is higher (or lower) than on both sides.
@@ -93,11 +90,6 @@ fn peak(rows: &[Row]) -> Claim {
         ([], lows) => format!("no local peak, but the least error at {}", each(lows)),
         (peaks, _) => format!("local peak at {}", each(peaks)),
     };
-    Claim {
-        claim: "the error has a local peak near dots of 5 mm",
-        basis: Basis::Solver,
-        verdict: Verdict::of(is_there(&peaks[0]), is_there(&peaks[1])),
-        paper: text(&peaks[0], &lows[0]),
-        sensor: text(&peaks[1], &lows[1]),
-    }
+    let found = [0, 1].map(|side| Found::new(Verdict::of(is_there(&peaks[side])), text(&peaks[side], &lows[side])));
+    Claim::new("the error has a local peak near dots of 5 mm", Basis::Solver, found)
 }

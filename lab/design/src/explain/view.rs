@@ -2,6 +2,7 @@
 
 use tactomo_study::view::{Cell, Format, PLAIN, Style, TEXT, Table, Value, View};
 
+use super::super::rank::p_text;
 use super::{Cause, Chosen, Eighth, Report, SINGLE, Tried};
 
 /// The most that a factor may be off for each colour, from good to bad.
@@ -27,7 +28,7 @@ pub fn view(report: &Report) -> View {
 
 /// A rank correlation and its chance.
 fn order(of: Option<[f64; 2]>) -> String {
-    of.map_or_else(|| "-".to_owned(), |[correlation, chance]| format!("{correlation:+.2} (p {chance:.3})"))
+    of.map_or_else(|| "-".to_owned(), |[correlation, chance]| format!("{correlation:+.2} ({})", p_text(chance)))
 }
 
 fn laws(report: &Report) -> Table {

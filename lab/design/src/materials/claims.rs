@@ -1,6 +1,6 @@
 //! What the paper concludes from its maps, on ours.
 
-use super::super::claim::{Basis, Trend, Verdict};
+use super::super::claim::{Basis, Found, Trend, Verdict};
 use super::super::rank::spearman;
 use super::{Claim, Condition, short};
 
@@ -31,28 +31,11 @@ const ACCURACY: [[Figure; 2]; 2] = [
 ];
 const AT: [&str; 2] = ["contact of 1 S/m", "contact at half of the drive"];
 
-/// Whether something holds at both strengths, and what was found at each.
-#[derive(Clone, Debug)]
-struct Found {
-    holds: Option<bool>,
-    text: String,
-}
-
-impl Found {
-    /// Of a test of each of two figures, which says whether it holds and what it found.
-    fn at_both(figures: [Figure; 2], what: &str, test: impl Fn(Figure) -> (Option<bool>, String)) -> Self {
-        let [one, half] = figures.map(test);
-        Self {
-            holds: one.0.zip(half.0).map(|(one, half)| one && half),
-            text: format!("{what}, {}: {}; {}: {}", AT[0], one.1, AT[1], half.1),
-        }
-    }
-}
-
-/// A claim on what was found with the paper's solver, and of the sensor.
-fn at_both(claim: &'static str, [paper, sensor]: [Found; 2]) -> Claim {
-    let verdict = Verdict::of(paper.holds, sensor.holds);
-    Claim { claim, basis: Basis::Solver, verdict, paper: paper.text, sensor: sensor.text }
+/// Whether something holds at both strengths, and what was found at each, by a test of each of two figures.
+fn at_both(figures: [Figure; 2], what: &str, test: impl Fn(Figure) -> Found) -> Found {
+    let [one, half] = figures.map(test);
+    let text = format!("{what}, {}: {}; {}: {}", AT[0], one.text, AT[1], half.text);
+    Found::new(one.verdict.and(half.verdict), text)
 }
 
 /// All claims of section III.B.
@@ -60,11 +43,11 @@ pub(super) fn of(conditions: &[Condition], conductivities_s_per_m: &[f64]) -> Ve
     let map = Map { conditions, conductivities_s_per_m };
     vec![
         map.suited(),
-        Claim::of_trends(
+        Claim::new(
             "sensitivity rises with the conductivity of the top",
             Basis::Definition,
-            &map.trend("SENS with top", SENSITIVITY[0], |c| c.top_s_per_m),
-            &map.trend("signal to noise with top", SENSITIVITY[1], |c| c.top_s_per_m),
+            [("SENS with top", SENSITIVITY[0]), ("signal to noise with top", SENSITIVITY[1])]
+                .map(|(what, figure)| map.trend(what, figure, |c| c.top_s_per_m).found()),
         ),
         map.most_sensitive(),
         map.sharpened_by_a_poor_bottom(),
@@ -93,13 +76,14 @@ impl<'a> Map<'a> {
 
     fn sharpened_by_a_poor_bottom(&self) -> Claim {
         let found = |figures: [Figure; 2], what: &str| {
-            Found::at_both(figures, &format!("{what} with bottom, reversed"), |figure| {
+            at_both(figures, &format!("{what} with bottom, reversed"), |figure| {
                 let trend = self.trend("", figure, |c| -c.bottom_s_per_m);
-                (trend.confirms(), trend.value_text())
+                Found::new(trend.verdict(), trend.value_text())
             })
         };
-        at_both(
+        Claim::new(
             "a low conductivity of the bottom sharpens the image",
+            Basis::Solver,
             [found(RESOLUTION[0], "SR"), found(RESOLUTION[1], "two points told apart")],
         )
     }
@@ -118,30 +102,28 @@ impl<'a> Map<'a> {
         let suited: Vec<f64> = self.uniform().filter(covers).map(|c| c.bottom_s_per_m).collect();
         let is_about = |found: f64| (1.0 / ABOUT..=ABOUT).contains(&(found / SUITED_S_PER_M));
         let is_only = suited.iter().any(|found| is_about(*found)) && suited.iter().all(|found| is_about(*found));
-        Claim {
-            claim: "about 0.2 S/m suits touch of several newtons",
-            basis: Basis::Metrics,
-            verdict: Verdict::of(balanced.map(|c| is_about(c.bottom_s_per_m)), self.uniform().next().map(|_| is_only)),
-            paper: balanced.map_or_else(
-                || "no uniform material has all four figures: images have collapsed".to_owned(),
-                |c| {
-                    format!(
-                        "the least of the four normalised metrics is best at {} S/m, uniform",
-                        short(c.bottom_s_per_m)
-                    )
-                },
+        let paper = balanced.map_or_else(
+            || "no uniform material has all four figures: images have collapsed".to_owned(),
+            |c| format!("the least of the four normalised metrics is best at {} S/m, uniform", short(c.bottom_s_per_m)),
+        );
+        let sensor = match (suited.first(), suited.last()) {
+            (Some(low), Some(high)) => format!(
+                "{} to {} N is within the range of every uniform foam from {} to {} S/m that is as soft as sample A",
+                TOUCH_N[0],
+                TOUCH_N[1],
+                short(*low),
+                short(*high)
             ),
-            sensor: match (suited.first(), suited.last()) {
-                (Some(low), Some(high)) => format!(
-                    "{} to {} N is within the range of every uniform foam from {} to {} S/m that is as soft as sample A",
-                    TOUCH_N[0],
-                    TOUCH_N[1],
-                    short(*low),
-                    short(*high)
-                ),
-                _ => format!("no uniform foam has {} to {} N within its range", TOUCH_N[0], TOUCH_N[1]),
-            },
-        }
+            _ => format!("no uniform foam has {} to {} N within its range", TOUCH_N[0], TOUCH_N[1]),
+        };
+        Claim::new(
+            "about 0.2 S/m suits touch of several newtons",
+            Basis::Metrics,
+            [
+                Found::new(Verdict::of(balanced.map(|c| is_about(c.bottom_s_per_m))), paper),
+                Found::new(Verdict::of(self.uniform().next().map(|_| is_only)), sensor),
+            ],
+        )
     }
 
     /// Highest sensitivity for 0.5 S/m above 0.001 S/m: where it is highest, by both readings of eq. (7) and of the sensor.
@@ -150,55 +132,51 @@ impl<'a> Map<'a> {
         let [solver, sensor] = SENSITIVITY.map(|figure| best(self.conditions.iter(), figure));
         let is_there = |c: &Condition| c.top_s_per_m > 100.0 * c.bottom_s_per_m;
         let place = |c: &Condition| c.title();
-        Claim {
-            claim: "the most sensitive is a conductive top (0.5 S/m) on a poor bottom (0.001 S/m)",
-            basis: Basis::Definition,
-            verdict: Verdict::of(
-                solver.or(at_half).map(|c| is_there(c) || at_half.is_some_and(is_there)),
-                sensor.map(is_there),
-            ),
-            paper: format!(
-                "SENS is highest at {}; at half of FMAX instead of half of what is applied, at {}",
-                said(solver, place),
-                said(at_half, place)
-            ),
-            sensor: format!("signal to noise is highest at {}", said(sensor, place)),
-        }
+        let is_highest = solver.or(at_half).map(|c| is_there(c) || at_half.is_some_and(is_there));
+        let paper = format!(
+            "SENS is highest at {}; at half of FMAX instead of half of what is applied, at {}",
+            said(solver, place),
+            said(at_half, place)
+        );
+        let text = format!("signal to noise is highest at {}", said(sensor, place));
+        Claim::new(
+            "the most sensitive is a conductive top (0.5 S/m) on a poor bottom (0.001 S/m)",
+            Basis::Definition,
+            [Found::new(Verdict::of(is_highest), paper), Found::new(Verdict::of(sensor.map(is_there)), text)],
+        )
     }
 
     /// High and even: the maximum rises along the diagonal, and no gradient of the same mean has more.
     fn high_and_even(&self) -> Claim {
-        let text = |[rises, even]: [Option<f64>; 2]| match (rises, even) {
-            (Some(rises), Some(even)) => format!(
-                "rank correlation with uniform conductivity {rises:+.2}; even has more than a gradient of the same mean in {:.0} % of pairs",
-                100.0 * even
-            ),
-            _ => NOT_COMPUTED.to_owned(),
-        };
         let found = MAXIMUM.map(|figure| {
             let pairs: Vec<_> = self.uniform().filter_map(|c| Some([c.bottom_s_per_m, figure(c)?])).collect();
-            [spearman(&pairs), self.share_of_pairs(figure, is_even_of).map(|(share, _)| share)]
+            let (rises, [even, all]) = (spearman(&pairs), self.counts_of_pairs(figure, is_even_of));
+            let text = match (rises, all) {
+                (Some(rises), 1..) => format!(
+                    "rank correlation with uniform conductivity {rises:+.2}; even has more than a gradient of the same mean in {}",
+                    of_pairs([even, all])
+                ),
+                _ => NOT_COMPUTED.to_owned(),
+            };
+            Found::new(Verdict::of_correlation(rises, pairs.len()).and(Verdict::of_share(even, all)), text)
         });
-        let holds = found.map(|[rises, even]| Some(rises? > 0.5 && even? > 0.5));
-        Claim {
-            claim: "the maximum force is largest for high and even conductivity",
-            basis: Basis::Definition,
-            verdict: Verdict::of(holds[0], holds[1]),
-            paper: text(found[0]),
-            sensor: text(found[1]),
-        }
+        Claim::new("the maximum force is largest for high and even conductivity", Basis::Definition, found)
     }
 
     fn bottom_above_top(&self) -> Claim {
         let found = |figures: [Figure; 2], what: &str| {
-            Found::at_both(figures, &format!("{what} is better so than the other way round"), |figure| {
-                let share = self.share_of_pairs(figure, is_mirrored_with_better_bottom);
-                let text = |(share, pairs): (f64, u32)| format!("in {:.0} % of {pairs} pairs", 100.0 * share);
-                (share.map(|(share, _)| share > 0.5), share.map_or(NOT_COMPUTED.to_owned(), text))
+            at_both(figures, &format!("{what} is better so than the other way round"), |figure| {
+                let [better, all] = self.counts_of_pairs(figure, is_mirrored_with_better_bottom);
+                let text = match all {
+                    0 => NOT_COMPUTED.to_owned(),
+                    _ => format!("in {}", of_pairs([better, all])),
+                };
+                Found::new(Verdict::of_share(better, all), text)
             })
         };
-        at_both(
+        Claim::new(
             "accuracy wants the bottom more conductive than the top",
+            Basis::Solver,
             [found(ACCURACY[0], "PA"), found(ACCURACY[1], "the standard error of places")],
         )
     }
@@ -218,14 +196,16 @@ impl<'a> Map<'a> {
             means.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(bottom, _)| bottom)
         };
         let found = |figures: [Figure; 2], what: &str| {
-            Found::at_both(figures, &format!("{what} is best"), |figure| {
+            at_both(figures, &format!("{what} is best"), |figure| {
                 let at = best_at(figure);
                 let is_there = at.map(|at| (1.0 / ABOUT..=ABOUT).contains(&(at / PEAK_S_PER_M)));
-                (is_there, at.map_or(NOT_COMPUTED.to_owned(), |at| format!("at a bottom of {} S/m", short(at))))
+                let text = at.map_or(NOT_COMPUTED.to_owned(), |at| format!("at a bottom of {} S/m", short(at)));
+                Found::new(Verdict::of(is_there), text)
             })
         };
-        at_both(
+        Claim::new(
             "accuracy peaks near 1 S/m at the bottom",
+            Basis::Solver,
             [found(ACCURACY[0], "mean PA"), found(ACCURACY[1], "the mean standard error of places")],
         )
     }
@@ -246,18 +226,13 @@ impl<'a> Map<'a> {
             Some([]) => "no condition is in the best tenth of all four figures".to_owned(),
             Some([first, ..]) => format!("{} is in the best tenth of all four figures", first.title()),
         };
-        Claim {
-            claim: "no condition is best in all four",
-            basis: Basis::Metrics,
-            verdict: Verdict::of(found[0].as_ref().map(Vec::is_empty), found[1].as_ref().map(Vec::is_empty)),
-            paper: text(&found[0]),
-            sensor: text(&found[1]),
-        }
+        let found = found.map(|best| Found::new(Verdict::of(best.as_ref().map(Vec::is_empty)), text(&best)));
+        Claim::new("no condition is best in all four", Basis::Metrics, found)
     }
 
-    /// Of pairs of conditions that belong together, the share of those of which the first has more of a figure, and how many pairs there are.
-    fn share_of_pairs(&self, figure: Figure, together: fn(&Condition, &Condition) -> bool) -> Option<(f64, u32)> {
-        let mut counts = [0u32; 2];
+    /// Of pairs of conditions that belong together, those of which the first has more of a figure, and all.
+    fn counts_of_pairs(&self, figure: Figure, together: fn(&Condition, &Condition) -> bool) -> [usize; 2] {
+        let mut counts = [0; 2];
         for first in self.conditions {
             for second in self.conditions.iter().filter(|second| together(first, second)) {
                 if let (Some(a), Some(b)) = (figure(first), figure(second)) {
@@ -265,8 +240,7 @@ impl<'a> Map<'a> {
                 }
             }
         }
-        let all = counts[0] + counts[1];
-        (all > 0).then(|| (f64::from(counts[1]) / f64::from(all), all))
+        [counts[1], counts[0] + counts[1]]
     }
 
     /// From 0 for the worst condition to 1 for the best, even in the logarithm for what spans decades.
@@ -285,6 +259,11 @@ impl<'a> Map<'a> {
 }
 
 const NOT_COMPUTED: &str = "too few conditions";
+
+/// A share in words.
+fn of_pairs([yes, all]: [usize; 2]) -> String {
+    format!("{:.0} % of {all} pairs", 100.0 * yes as f64 / all as f64)
+}
 
 /// Smallest and largest.
 pub(crate) fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {

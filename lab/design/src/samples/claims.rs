@@ -1,7 +1,7 @@
 //! Whether the simulation ranks the samples as the experiment did.
 
-use super::super::claim::{Basis, Verdict};
-use super::super::rank::{chance, holm, spearman};
+use super::super::claim::{Basis, Found, Verdict};
+use super::super::rank::{chance, holm, p_text, spearman};
 use super::{Claim, Sample};
 
 /// One false prediction among all tests of the family is less likely than this.
@@ -52,12 +52,12 @@ pub(super) fn of(samples: &[Sample]) -> Vec<Claim> {
         .collect();
     let chances: Vec<_> = ranked.iter().flatten().map(|ranked| ranked.chance).collect();
     let stand = holm(&chances, FALSE_ONE);
-    let claim = |((metric, [solver, sensor]), stand): ((&Metric, &[Ranked; 2]), &[bool])| Claim {
-        claim: metric.claim,
-        basis: Basis::Solver,
-        verdict: Verdict::of(solver.is_there(stand[0]), sensor.is_there(stand[1])),
-        paper: solver.text("the same metric", stand[0], chances.len()),
-        sensor: sensor.text(metric.sensor.0, stand[1], chances.len()),
+    let claim = |((metric, [solver, sensor]), stand): ((&Metric, &[Ranked; 2]), &[bool])| {
+        let found = [
+            solver.found("the same metric", stand[0], chances.len()),
+            sensor.found(metric.sensor.0, stand[1], chances.len()),
+        ];
+        Claim::new(metric.claim, Basis::Solver, found)
     };
     METRICS.iter().zip(&ranked).zip(stand.chunks_exact(2)).map(claim).collect()
 }
@@ -76,23 +76,40 @@ impl Ranked {
         Self { correlation: spearman(&pairs), chance: chance(&pairs), samples: pairs.len() }
     }
 
-    /// Whether the order is predicted: in the right direction, and beyond what chance gives among all tests.
-    fn is_there(&self, stands: bool) -> Option<bool> {
-        self.correlation.map(|correlation| stands && correlation > 0.0)
-    }
-
-    fn text(&self, what: &str, stands: bool, tests: usize) -> String {
+    /// Whether the order is predicted: in the right direction, and beyond what chance gives among all tests. What is not beyond it is not shown; of fewer than
+    /// five samples no order is.
+    fn found(&self, what: &str, stands: bool, tests: usize) -> Found {
         let (Some(correlation), Some(chance)) = (self.correlation, self.chance) else {
-            return format!("{what}: too few samples");
+            return Found::new(Verdict::Unknown, format!("{what}: too few samples"));
         };
-        let words = match stands {
-            true if correlation > 0.0 => "the order is predicted",
-            true => "the order is the opposite",
-            false => "no more than chance can give",
+        let (verdict, words) = match stands {
+            true if correlation > 0.0 => (Verdict::Holds, "the order is predicted"),
+            true => (Verdict::DoesNotHold, "the order is the opposite"),
+            false => (Verdict::NotShown, "that shows nothing"),
         };
-        format!(
-            "{what}: rank correlation {correlation:+.2} (n = {}), p = {chance:.3} alone; of {tests} tests (Holm), {words}",
+        let p = p_text(chance);
+        let text = format!(
+            "{what}: rank correlation {correlation:+.2} (n = {}), {p} alone; of {tests} tests (Holm), {words}",
             self.samples
-        )
+        );
+        Found::new(verdict, text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_chance_may_give_is_not_shown_and_what_it_cannot_is() {
+        let verdict = |correlation, stands| {
+            let ranked = Ranked { correlation, chance: correlation.map(|_| 2e-5), samples: 9 };
+            let found = ranked.found("it", stands, 8);
+            (found.verdict, found.text.contains("p < 0.001"))
+        };
+        assert_eq!(verdict(Some(0.9), true), (Verdict::Holds, true));
+        assert_eq!(verdict(Some(-0.9), true), (Verdict::DoesNotHold, true));
+        assert_eq!(verdict(Some(0.7), false), (Verdict::NotShown, true));
+        assert_eq!(verdict(None, false), (Verdict::Unknown, false));
     }
 }

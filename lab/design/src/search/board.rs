@@ -32,9 +32,14 @@ impl Board {
         electrodes.checked_sub(1).and_then(|index| self.frames_per_s.get(index).copied()).unwrap_or(0.0)
     }
 
+    /// Voltage above that of a grounded electrode below which it reads nothing (V): the highest floor of its converters, zero where nothing hides.
+    pub fn floor_v(&self) -> f64 {
+        self.converters.iter().map(|converter| converter.range_v[0] - self.ground_v).fold(0.0, f64::max)
+    }
+
     /// Whether it hides light presses.
     pub fn has_floor(&self) -> bool {
-        self.converters.iter().any(|converter| converter.range_v[0] > self.ground_v)
+        self.floor_v() > 0.0
     }
 
     /// A detector as it measures it.

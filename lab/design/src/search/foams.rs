@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use tactomo_physics::detector::FOAMS;
+use tactomo_table::file::Format;
 
+/// A list of foams.
+const FORMAT: Format = Format::new("a list of foams", 1 << 20);
 /// Thicknesses that foams are taken to be sold in unless their list says otherwise (m).
 const THICKNESSES_M: [f64; 6] = [0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3, 10e-3];
 /// What a detector's file allows (S/m), and what is still a foam (Pa).
@@ -94,7 +97,7 @@ impl Material {
     /// # Errors
     /// [`FoamsError`] that names the file and what is wrong in it.
     pub fn read(path: &Path) -> Result<Vec<Self>, FoamsError> {
-        let text = std::fs::read_to_string(path).map_err(|error| FoamsError::Io { path: path.to_owned(), error })?;
+        let text = FORMAT.read_text(path).map_err(|error| FoamsError::Io { path: path.to_owned(), error })?;
         let file: File = toml::from_str(&text).map_err(|error| FoamsError::Toml { path: path.to_owned(), error })?;
         Self::check_all(&file.foam).map_err(|wrong| FoamsError::Foam { path: path.to_owned(), wrong })?;
         Ok(file.foam)

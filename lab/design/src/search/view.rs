@@ -3,7 +3,7 @@
 use tactomo_physics::detector::short;
 use tactomo_study::view::{Axis, Chart, MM, PLAIN, Series, Style, TEXT, Table, Unit, View};
 
-use super::{Answer, Choice, Compared, Costliest, Rating, Unmet, Wish};
+use super::{Answer, Choice, Compared, Costliest, Rating, Unmet, Wish, Wishes};
 
 /// Candidates that miss a wish by more than this factor are in no chart.
 const FAR: f64 = 5.0;
@@ -44,6 +44,9 @@ pub fn view(answer: &Answer) -> View {
     if let Some(compared) = &answer.compared {
         view = view.text(of_compared(compared, answer.rated));
     }
+    if let Some(lightest) = lightest(answer) {
+        view = view.text(lightest);
+    }
     let method = format!(
         "Places are the error that half of presses have less than, by Cramer and Rao's bounds of one frame for a ball of {} mm pressed with {} N, with the board's \
          noise and floor and the detector's tolerances, without calibration; two points likewise: what noise allows, which auto does not reach; forces run from \
@@ -81,6 +84,29 @@ fn advice(answer: &Answer) -> Vec<String> {
         )
     });
     impossible.chain(nearest).chain(relax).chain(answer.costliest.as_ref().map(of_costliest)).chain(floor).collect()
+}
+
+/// The smallest force that the board sees, on the choices' best and on the detector that is compared.
+fn lightest(answer: &Answer) -> Option<String> {
+    let Wishes { board, tip_m, .. } = &answer.wishes;
+    let best = answer.choices.first().map(|choice| ("choice 1", &choice.rating));
+    let compared = answer.compared.as_ref().map(|compared| (compared.name.as_str(), &compared.rating));
+    let seen = |(name, rating): (&str, &Rating)| {
+        Some(format!("{} N on {name}", PLAIN.text(Some(rating.smallest_n.filter(|force_n| force_n.is_finite())?))))
+    };
+    let seen: Vec<String> = best.into_iter().chain(compared).filter_map(seen).collect();
+    let hides = match board.floor_v() {
+        floor_v if floor_v > 0.0 => format!("the floor of its converters ({floor_v:.2} V), or of noise"),
+        _ => "noise".to_owned(),
+    };
+    (!seen.is_empty()).then(|| {
+        format!(
+            "The smallest force that the board {} sees, of a ball of {} mm: {}. What presses more lightly does not rise out of {hides}.",
+            board.name,
+            2e3 * tip_m,
+            seen.join(", ")
+        )
+    })
 }
 
 fn of_costliest(costliest: &Costliest) -> String {

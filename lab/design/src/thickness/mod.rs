@@ -9,11 +9,12 @@ use tactomo_physics::detector::{Detector, Layer};
 use tactomo_physics::forward::shell::Shell;
 use tactomo_physics::forward::{ForwardError, ForwardModel, Slab, readings_v};
 use tactomo_physics::scene::{Contact, Touch};
+use tactomo_study::judge::{answered, wrong_m};
 use tactomo_study::{Experiment, Frame, StudyError};
 use tactomo_touch::metrics::Matching;
 use tactomo_touch::solve::Method;
 
-use super::claim::{Basis, Trend, Verdict};
+use super::claim::{Basis, Found, Trend, Verdict};
 use super::press::{COMPARED_S_PER_M, nine_places};
 use super::rank::mean;
 use super::{Claim, Course, DesignError, Press, Progress};
@@ -23,8 +24,6 @@ pub use self::view::view;
 /// Thicknesses (m), and conductivity (S/m), section III.B.
 const THICKNESSES_M: [f64; 5] = [1e-3, 2e-3, 4e-3, 8e-3, 16e-3];
 const CONDUCTIVITY_S_PER_M: f64 = 1.0;
-/// A solver fails from an error of this share of the width on: 3 mm of 60, a fifth of the distance of electrodes.
-const FAILS_OF_WIDTH: f64 = 0.05;
 /// Correlation above which vectors count as strongly correlated.
 const STRONG: f64 = 0.9;
 
@@ -105,7 +104,7 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
     let mut rows: Vec<Row> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
     rows.reverse();
     let course = Course::since(start, is_stopped, claims(&rows));
-    Ok(Report { rows, fails_from_m: FAILS_OF_WIDTH * Detector::default().outline.size_m()[0], course })
+    Ok(Report { rows, fails_from_m: wrong_m(&Detector::default()), course })
 }
 
 fn row(plan: &Plan, thickness_m: f64) -> Result<Row, DesignError> {
@@ -193,7 +192,7 @@ fn error_m(method: Method, experiment: &Experiment, frames: &[Frame]) -> Result<
             .solve(&frame.readings)
             .map_err(|error| StudyError::Solve { solver: method.name().to_owned(), error })?;
         let truth = frame.contacts.as_deref().unwrap_or_default();
-        errors_m.push(Matching::within(reach_m, truth, &solution.contacts).ospa_m(reach_m));
+        errors_m.push(Matching::within(reach_m, truth, answered(&solution)).ospa_m(reach_m));
     }
     Ok(mean(&errors_m).unwrap_or(0.0))
 }
@@ -213,32 +212,36 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
     // Of the sensor it would be that a solver with the right model got worse as well.
     let right = rows.iter().filter_map(|row| Some([row.thickness_m, contacts(row)?.on_slab_m])).collect::<Vec<_>>();
     let worse = right.first().zip(right.last()).map(|(thin, thick)| thick[1] > 2.0 * thin[1]);
+    let correlations = format!(
+        "correlation {:.3} at {:.0} mm, {:.3} at {:.0} mm",
+        first.correlation,
+        mm(first),
+        last.correlation,
+        mm(last)
+    );
+    let [least, most] = [first, last].map(|row| row.mean_absolute_error);
+    let growth = format!("{}: {least:.3} to {most:.3} of the largest reading", grows.text());
     vec![
-        Claim {
-            claim: "readings of thick detectors correlate strongly with those of the thin shell",
-            basis: Basis::Readings,
-            verdict: Verdict::of(Some(correlated), Some(correlated)),
-            paper: format!(
-                "correlation {:.3} at {:.0} mm, {:.3} at {:.0} mm",
-                first.correlation,
-                mm(first),
-                last.correlation,
-                mm(last)
-            ),
-            sensor: format!("yet `contacts` that takes them for a shell is off by {}", off(|row| row.on_shell_m)),
-        },
-        Claim {
-            claim: "the error grows with the detector's thickness",
-            basis: Basis::Readings,
-            verdict: Verdict::of(grows.confirms(), worse),
-            paper: format!(
-                "{}: {:.3} to {:.3} of the largest reading",
-                grows.text(),
-                first.mean_absolute_error,
-                last.mean_absolute_error
-            ),
-            sensor: format!("`contacts` with the slab is off by {}", off(|row| row.on_slab_m)),
-        },
+        Claim::new(
+            "readings of thick detectors correlate strongly with those of the thin shell",
+            Basis::Readings,
+            [
+                correlations,
+                format!("yet `contacts` that takes them for a shell is off by {}", off(|row| row.on_shell_m)),
+            ]
+            .map(|text| Found::new(Verdict::of(Some(correlated)), text)),
+        ),
+        Claim::new(
+            "the error grows with the detector's thickness",
+            Basis::Readings,
+            [
+                Found::new(grows.verdict(), growth),
+                Found::new(
+                    Verdict::of(worse),
+                    format!("`contacts` with the slab is off by {}", off(|row| row.on_slab_m)),
+                ),
+            ],
+        ),
     ]
 }
 

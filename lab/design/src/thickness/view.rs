@@ -128,7 +128,7 @@ fn errors(report: &Report) -> Table {
         });
     }
     let note = format!(
-        "A solver fails from a mean error of {:.0} mm on, a fifth of the distance of electrodes; a dash: nowhere.",
+        "A solver fails from a mean error of {:.2} mm on, 15 % of the distance of electrodes; a dash: nowhere.",
         report.fails_from_m * 1e3
     );
     table

@@ -208,7 +208,7 @@ fn speed() -> Vec<Figure> {
                 figure("tradeoff", format!("tradeoff.{solver}.{name}.{field}"), says, path)
             };
             all.push(of("time", "time a frame, median", "time_us/median").unit("us", 1.0).share(0.5));
-            all.push(of("error", "error", "error_m").mm().share(0.2));
+            all.push(of("error", "error, median", "error_spread_m/median").mm().share(0.2));
         }
     }
     all

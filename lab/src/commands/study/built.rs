@@ -7,6 +7,7 @@ use tactomo_touch::solve::Method;
 
 use super::super::shown::Shown;
 use tactomo_cli::choice::{self, DetectorArgs};
+use tactomo_cli::options;
 use tactomo_cli::output::{self, message};
 
 /// Tries solvers on detectors as built, of which they know the description only.
@@ -38,7 +39,7 @@ pub struct Args {
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "files")]
     presses: u32,
     /// Takes this share of the description's tolerances
-    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = options::number("a share", 0.0..=10.0))]
     tolerances: f64,
     /// Calibrates each detector before, with so many single presses at unknown places; of a file with its first ones, and tries the rest
     #[arg(long, value_name = "PRESSES", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
@@ -78,11 +79,4 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let files = args.shown.files()?;
     let report = built::run(&plan, &output::command_line(), &|step| message!("{step}"))?;
     args.shown.put_out(files, &report, &[built::view(&report)])
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(share) if (0.0..=10.0).contains(&share) => Ok(share),
-        _ => Err("a number from 0 to 10 is needed".to_owned()),
-    }
 }

@@ -5,6 +5,7 @@ use tactomo_touch::solve::Method;
 
 use super::super::shown::{Shown, watched, whole};
 use tactomo_cli::choice::{self, DetectorArgs};
+use tactomo_cli::options;
 use tactomo_cli::output;
 
 /// Places along the longer side: in a quick look, and else.
@@ -35,7 +36,7 @@ pub struct Args {
     #[arg(long, value_name = "PLACES", value_parser = clap::value_parser!(u8).range(2..))]
     across: Option<u8>,
     /// Conductance of the press, in sheet conductances: 0.03 is light, 0.3 firm
-    #[arg(long, default_value_t = 0.3, value_parser = sheets)]
+    #[arg(long, default_value_t = 0.3, value_parser = options::number("a number of sheet conductances", 1e-4..=100.0))]
     sheets: f64,
     /// Seed of the noise: the same seed gives the same figures
     #[arg(long, default_value_t = 1)]
@@ -62,11 +63,4 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let report = watched(|progress| surface::run(&plan, &output::command_line(), progress))?;
     args.shown.put_out(files, &report, &[surface::view(&report)])?;
     whole(&report.missing)
-}
-
-fn sheets(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(sheets) if (1e-4..=100.0).contains(&sheets) => Ok(sheets),
-        _ => Err("a number from 0.0001 to 100 is needed".to_owned()),
-    }
 }

@@ -10,10 +10,11 @@ use std::path::PathBuf;
 
 use super::calibrate::{Calibrated, Scene, read, rubbed};
 use super::experiment::{Experiment, StudyError};
+use super::judge::{Judged, wrong_m};
 use super::presses;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
-use tactomo_physics::scene::Contact;
+use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Noise, measured};
 use tactomo_physics::threads::map_on;
 use tactomo_touch::solve::{Method, Problem, Solution};
@@ -83,7 +84,7 @@ pub struct Trial {
     pub solver: &'static str,
     /// What touched.
     pub truth: Vec<Contact>,
-    /// Contacts found, or beside an image.
+    /// Contacts found: none where the answer is a shape or an image.
     pub found: Vec<[f64; 2]>,
     /// What the solver chose and why, if it says so.
     pub choice: Option<String>,
@@ -197,16 +198,18 @@ fn try_all(plan: &Plan, detector: usize, built: &Built) -> Result<Vec<Trial>, St
             solver.reset();
             let (solution, time) = super::stopwatch::timed(|| solver.solve(readings));
             let solution = solution.map_err(|error| StudyError::Solve { solver: method.name().to_owned(), error })?;
-            trials.push(Trial::new([detector, scene], *method, contacts, &solution, time.as_secs_f64()));
+            let touches: Vec<Touch> = contacts.iter().copied().map(Touch::from).collect();
+            let judged = Judged::of(wrong_m(built.problem.detector()), &touches, &solution);
+            trials.push(Trial::new([detector, scene], *method, judged, &solution, time.as_secs_f64()));
         }
     }
     Ok(trials)
 }
 
 impl Trial {
-    fn new([detector, scene]: [usize; 2], method: Method, truth: &[Contact], solution: &Solution, time_s: f64) -> Self {
-        let found = &solution.contacts;
-        let matching = tactomo_touch::metrics::Matching::within(f64::INFINITY, truth, found);
+    fn new([detector, scene]: [usize; 2], method: Method, judged: Judged, solution: &Solution, time_s: f64) -> Self {
+        let (matching, is_count_right) = (judged.pairs(), judged.is_number_right());
+        let Judged { found, truth, .. } = judged;
         let mut sigmas = Vec::new();
         let (mut claimed_m, mut ln_conductances) = (Vec::new(), Vec::new());
         for pair in &matching.pairs {
@@ -218,16 +221,15 @@ impl Trial {
                 claimed_m.push((0.5 * (claimed.x_m.powi(2) + claimed.y_m.powi(2))).sqrt());
             }
         }
-        let is_whole = solution.choice.is_some() && !solution.is_contacts();
         Self {
             detector,
             scene,
             solver: method.name(),
-            truth: truth.to_vec(),
+            truth,
             found: found.iter().map(|contact| [contact.x_m, contact.y_m]).collect(),
             choice: solution.choice.as_ref().map(|choice| format!("{}: {}", choice.what, choice.why)),
             errors_m: matching.pairs.iter().map(|pair| pair.distance_m).collect(),
-            is_count_right: found.len() == truth.len() && !is_whole,
+            is_count_right,
             misfit: solution.flags.misfit,
             sigmas,
             ln_conductances,

@@ -1,15 +1,13 @@
-//! An answer against the truth.
+//! An answer to random contacts: what the [judge](crate::judge) says of each, and how far it is from the bound.
 
 use super::scenes::scale;
 use crate::bound::Bound;
-use crate::scenes::electrode_distance_m;
+use crate::judge::{self, wrong_m};
 use tactomo_physics::detector::Detector;
-use tactomo_physics::scene::Contact;
-use tactomo_touch::metrics::{Matching, Pair};
+use tactomo_physics::scene::{Contact, Touch};
+use tactomo_touch::metrics::Pair;
 use tactomo_touch::solve::{FoundContact, Solution};
 
-/// A contact counts as found if what was found is within this share of the electrodes' mean distance.
-const REACH: f64 = 1.0 / 3.0;
 /// What was found further off stands for an invisible contact that nothing else stands for, if it is within so many of its bounds.
 const BOUNDS: f64 = 3.0;
 /// A contact is visible if the bound on the logarithm of its conductance, for a known radius, is below this.
@@ -28,6 +26,8 @@ pub struct Judged {
     pub found: Vec<FoundContact>,
     /// Which of the found ones are not there, visible or not.
     pub invented: Vec<usize>,
+    /// Whether the answer is contacts, and no shape and no image.
+    pub is_contacts: bool,
     /// Whether the solver says that its answer does not explain the readings.
     pub misfit: bool,
     /// Probability that the solver claims for its count.
@@ -88,30 +88,24 @@ pub struct Match {
 impl Judged {
     /// Compares a solution with the contacts that are there and the bounds of their errors.
     pub(super) fn new(detector: &Detector, truth: &[Contact], bounds: Option<&[Bound]>, solution: &Solution) -> Self {
-        // Contacts that are kept beside a shape or an image are not the answer.
-        let is_image = solution.choice.as_ref().is_some_and(|choice| choice.what == "image");
-        let found = if solution.shape.is_some() || is_image { &[] } else { &solution.contacts[..] };
-        let matching = Matching::within(REACH * electrode_distance_m(detector), truth, found);
+        let touches: Vec<Touch> = truth.iter().copied().map(Touch::from).collect();
+        let judge::Judged { found, near, is_kind_right, .. } = judge::Judged::of(wrong_m(detector), &touches, solution);
         let bound_of = |index: usize| bounds.and_then(|bounds| bounds.get(index)).copied();
         let is_place_of = |found: &FoundContact, index: usize| {
             let distance_m = (found.x_m - truth[index].x_m).hypot(found.y_m - truth[index].y_m);
-            bound_of(index)
-                .is_some_and(|bound| bound.conductance >= VISIBLE && distance_m < BOUNDS * bound.position_any_radius_m)
+            bound_of(index).is_some_and(|bound| bound.conductance >= VISIBLE && distance_m < BOUNDS * bound.position_m)
         };
-        let mut missed = matching.missed.clone();
-        let mut invented = matching.invented.clone();
-        invented.retain(|found| {
-            match missed.iter().position(|index| is_place_of(&solution.contacts[*found], *index)) {
-                Some(at) => {
-                    missed.remove(at);
-                    false
-                }
-                None => true,
+        let (mut missed, mut invented) = (near.missed, near.invented);
+        invented.retain(|contact| match missed.iter().position(|index| is_place_of(&found[*contact], *index)) {
+            Some(at) => {
+                missed.remove(at);
+                false
             }
+            None => true,
         });
         let of = |(index, contact): (usize, &Contact)| {
             let bound = bound_of(index);
-            let pair = matching.pairs.iter().find(|pair| pair.truth == index);
+            let pair = near.pairs.iter().find(|pair| pair.truth == index);
             TrueContact {
                 contact: *contact,
                 scaled_radius_m: contact.radius_m / scale(detector),
@@ -119,13 +113,14 @@ impl Judged {
                 place: Place::of(detector, contact),
                 bound,
                 is_visible: bound.is_some_and(|bound| bound.conductance < VISIBLE),
-                found: pair.map(|pair| Match::of(contact, bound, pair, &solution.contacts[pair.found])),
+                found: pair.map(|pair| Match::of(contact, bound, pair, &found[pair.found])),
             }
         };
         Self {
             truth: truth.iter().enumerate().map(of).collect(),
             found: found.to_vec(),
             invented,
+            is_contacts: is_kind_right,
             misfit: solution.flags.misfit,
             certainty: solution.certainty,
             residual: solution.residual,
@@ -140,17 +135,18 @@ impl Judged {
 
     /// Whether as many contacts were found as are there.
     pub fn is_count_right(&self) -> bool {
-        self.found.len() == self.truth.len()
+        self.is_contacts && self.found.len() == self.truth.len()
     }
 
     /// Whether as many contacts were found as are there, but for invisible ones.
     pub fn is_visible_count_right(&self) -> bool {
-        (self.visible().count()..=self.truth.len()).contains(&self.found.len())
+        self.is_contacts && (self.visible().count()..=self.truth.len()).contains(&self.found.len())
     }
 
-    /// Contacts invented, and visible ones missed.
+    /// Contacts invented, visible ones missed, and a shape or an image that is not there.
     pub fn faults(&self) -> usize {
-        self.invented.len() + self.visible().filter(|contact| contact.found.is_none()).count()
+        let missed = self.visible().filter(|contact| contact.found.is_none()).count();
+        self.invented.len() + missed + usize::from(!self.is_contacts)
     }
 
     /// The largest error over its bound of the visible ones; 0 if none of them was found.
@@ -188,7 +184,7 @@ impl Match {
         Self {
             index: pair.found,
             error_m: pair.distance_m,
-            over_bound: bound.map(|bound| pair.distance_m / bound.position_any_radius_m),
+            over_bound: bound.map(|bound| pair.distance_m / bound.position_m),
             place_sigmas: found.uncertainty.map(|claimed| {
                 [sigmas(found.x_m - truth.x_m, claimed.x_m), sigmas(found.y_m - truth.y_m, claimed.y_m)]
             }),
@@ -202,12 +198,10 @@ impl Match {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tactomo_touch::solve::{Flags, Uncertainty};
+    use tactomo_touch::solve::{Flags, FoundLine, FoundShape, Uncertainty};
 
-    const CLEAR: Bound =
-        Bound { position_m: 1e-4, position_any_radius_m: 1e-4, conductance: 0.05, axes_any_radius_m: [0.0; 2] };
-    const FAINT: Bound =
-        Bound { position_m: 2e-3, position_any_radius_m: 2e-3, conductance: 0.5, axes_any_radius_m: [0.0; 2] };
+    const CLEAR: Bound = Bound { position_m: 1e-4, conductance: 0.05, axes_m: [0.0; 2] };
+    const FAINT: Bound = Bound { position_m: 2e-3, conductance: 0.5, axes_m: [0.0; 2] };
 
     fn there(x_mm: f64, y_mm: f64) -> Contact {
         Contact::flat(1e-3 * x_mm, 1e-3 * y_mm, 2e-3, 1e-3)
@@ -233,16 +227,23 @@ mod tests {
     }
 
     #[test]
-    fn what_is_beyond_a_third_of_the_electrodes_distance_is_invented_and_what_is_invisible_is_not() {
+    fn what_is_too_far_off_is_invented_and_what_is_invisible_is_not() {
         let truth = [there(0.0, 0.0), there(20.0, 0.0)];
-        let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 4.9), seen(24.0, 0.0), seen(-20.0, 0.0)]);
+        let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 2.2), seen(24.0, 0.0), seen(-20.0, 0.0)]);
         assert_eq!((answer.faults(), &answer.invented[..]), (1, &[2][..]));
-        let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 5.1), seen(24.0, 0.0)]);
+        let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 2.3), seen(24.0, 0.0)]);
         assert_eq!((answer.faults(), &answer.invented[..], answer.is_count_right()), (2, &[0][..], true));
         let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 0.1), seen(25.9, 0.0)]);
         assert_eq!((answer.faults(), answer.truth[1].found), (0, None), "within three of its bounds");
         let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 0.1), seen(26.1, 0.0)]);
         assert_eq!(answer.faults(), 1);
+    }
+
+    #[test]
+    fn a_line_where_nothing_visible_touches_is_a_fault() {
+        let line = Solution { shape: Some(FoundShape::Line(FoundLine::default())), ..Solution::default() };
+        let answer = Judged::new(&Detector::default(), &[there(0.0, 0.0)], Some(&[FAINT]), &line);
+        assert_eq!((answer.faults(), answer.is_visible_count_right()), (1, false));
     }
 
     #[test]

@@ -181,8 +181,7 @@ mod tests {
     use tactomo_physics::scene::Contact;
     use tactomo_touch::solve::{FoundContact, Solution, Uncertainty};
 
-    const CLEAR: Bound =
-        Bound { position_m: 1e-4, position_any_radius_m: 1e-4, conductance: 0.05, axes_any_radius_m: [0.0; 2] };
+    const CLEAR: Bound = Bound { position_m: 1e-4, conductance: 0.05, axes_m: [0.0; 2] };
 
     /// Contacts in a row, a centimetre apart, of a radius (mm) and a conductance (sheet conductances), and those found this far off (mm).
     fn trial(sizes: &[(f64, f64)], off_mm: &[f64]) -> Trial {

@@ -16,8 +16,9 @@ use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::finer_model;
 use tactomo_touch::metrics::Matching;
 
-use super::bound::RowInformation;
+use super::bound::{Bound, RowInformation};
 use super::experiment::{Experiment, StudyError};
+use super::judge::wrong_m;
 use super::machine::Machine;
 
 use self::path::Path;
@@ -91,11 +92,11 @@ pub struct Point {
     pub arrived_m: f64,
     /// The same against where they were in the middle of the frame's rows (m).
     pub middle_m: f64,
-    /// Share of answers with as many contacts as there are, all within reach.
+    /// Share of answers with as many contacts as there are, none of them [too far off](crate::judge::WRONG_SHARE).
     pub count_right: f64,
     /// Mean error of these alone, against where the contacts are when the frame has arrived (m).
     pub right_m: Option<f64>,
-    /// Cramer-Rao bound of the rows of a frame alone, radii not known (m), at most `reach_m`: root mean square, mean of frames.
+    /// Cramer-Rao bound of the rows of a frame alone, radii known to a factor of two (m), at most `reach_m`: mean distance, mean of frames.
     pub bound_rows_m: f64,
     /// The same of all rows that have arrived; of contacts that stand.
     pub bound_all_m: Option<f64>,
@@ -180,7 +181,7 @@ fn point(
 ) -> Result<Point, StudyError> {
     let electrodes = experiment.detector.electrodes.len();
     let times = budget::frame(plan.rows, electrodes);
-    let reach_m = experiment.reach_m();
+    let (reach_m, wrong_m) = (experiment.reach_m(), wrong_m(&experiment.detector));
     let is_still = speed_m_per_s == 0.0;
     let mut sums = Sums::default();
     for scene in scenes {
@@ -197,7 +198,7 @@ fn point(
                 let information = scene.information(speed_m_per_s * answer.middle_s);
                 bound_m(information, answers, electrodes).min(reach_m)
             };
-            sums.add(answer, [&arrived, &middle], reach_m);
+            sums.add(answer, [&arrived, &middle], [reach_m, wrong_m]);
             sums.bound_rows_m += bound(std::slice::from_ref(answer));
             sums.bound_all_m += if is_still { bound(&answers) } else { 0.0 };
         }
@@ -232,12 +233,13 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, answer: &Answer, [arrived, middle]: [&[Contact]; 2], reach_m: f64) {
+    fn add(&mut self, answer: &Answer, [arrived, middle]: [&[Contact]; 2], [reach_m, wrong_m]: [f64; 2]) {
+        let near = Matching::within(wrong_m, middle, &answer.contacts);
         let [arrived, middle] = [arrived, middle].map(|truth| Matching::within(reach_m, truth, &answer.contacts));
         self.answers += 1;
         self.arrived_m += arrived.ospa_m(reach_m);
         self.middle_m += middle.ospa_m(reach_m);
-        if middle.missed.is_empty() && middle.invented.is_empty() {
+        if near.missed.is_empty() && near.invented.is_empty() {
             self.right += 1;
             self.right_m += arrived.ospa_m(reach_m);
         }
@@ -249,7 +251,7 @@ fn bound_m(information: &RowInformation, answers: &[Answer], electrodes: usize) 
     let mut times = vec![0.0; electrodes];
     answers.iter().flat_map(|answer| &answer.grounds).for_each(|ground| times[*ground] += 1.0);
     let Some(bounds) = information.bounds(&times) else { return f64::INFINITY };
-    bounds.iter().map(|bound| bound.position_any_radius_m).sum::<f64>() / bounds.len().max(1) as f64
+    bounds.iter().map(Bound::mean_m).sum::<f64>() / bounds.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -129,7 +129,7 @@ fn figures(report: &Report) -> Table {
         .column("of all rows", mm, |point| point.bound_all_m)
         .note(
             "age: from the middle of a frame's rows to its arrival; arrived, middle: mean error against where contacts are at either; count right: answers \
-             with none missed or invented; bounds: Cramer-Rao, of a frame's rows, and of all rows since the touch, radii not known",
+             with none missed, invented or too far off; bounds: Cramer-Rao, mean distance, of a frame's rows, and of all rows since the touch, radii known to a factor of two",
         )
         .data()
         .into()
@@ -145,8 +145,8 @@ fn method(report: &Report) -> String {
          but a search is made at most every 4 ms. Adaptive grounds are chosen as in live, at most every 40 ms, for which the board stops for 1.5 ms: all \
          in turn for what stands or has just come, and for what moves those that tell most of it, with every fourth row one of all in turn. Contacts \
          that stand: the last answer within 50 ms of the touch; that move: all answers from 50 to 120 ms. Error: mean distance of contacts found from \
-         those that are there, where one missed or invented counts {:.0} mm (OSPA of order 1). The bound is a root mean square of errors; their mean may \
-         be a tenth to a fifth below it.",
+         those that are there, where one missed or invented counts {:.0} mm (OSPA of order 1). The bound is the mean distance of \
+         normal errors with the covariance of the Cramer-Rao bound, radii known to a factor of two.",
         report.scenes,
         report.detector,
         report.model,

@@ -3,7 +3,7 @@
 use super::scenes::{APART, pair};
 use super::sweep::Bench;
 use super::trials::Trials;
-use crate::bound::{Errors, cramer_rao};
+use crate::bound::{Bound, Errors, cramer_rao};
 use crate::experiment::StudyError;
 use crate::scenes::SceneKind;
 use crate::score::Summary;
@@ -102,14 +102,14 @@ impl Charted {
     }
 }
 
-/// Mean of the bound over contacts and places (m); `None` where they cannot be separated.
+/// Mean distance of errors at the bound over contacts and places (m); `None` where they cannot be separated.
 fn bound(bench: &Bench, contacts: impl Fn(u64) -> Vec<Contact>) -> Result<Option<f64>, StudyError> {
     let detector = &bench.sound.detector;
     let errors = Errors::of_noise(detector, detector.adc.deviation_v());
     let mut all = Vec::new();
     for seed in bench.seeds() {
         match cramer_rao(&*bench.sound.problem.model, &contacts(seed), &errors)? {
-            Some(bounds) => all.extend(bounds.iter().map(|bound| bound.position_m)),
+            Some(bounds) => all.extend(bounds.iter().map(Bound::mean_m)),
             None => return Ok(None),
         }
     }

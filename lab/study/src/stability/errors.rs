@@ -1,4 +1,4 @@
-//! Errors as they are, beside what they are in terms of a solver's own harmless error.
+//! Errors over the points of a sweep.
 
 use super::breakdown::CellReport;
 use super::report::ErrorRange;

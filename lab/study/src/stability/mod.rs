@@ -15,7 +15,7 @@ mod view;
 mod wrong;
 
 pub use self::bounds::{BoundChart, BoundCurve, BoundReport};
-pub use self::breakdown::{Break, Breakdown, CellReport, Margin, Wrong};
+pub use self::breakdown::{Break, Breakdown, CellReport, Classes, Margin};
 pub use self::report::{ErrorRange, PointReport, Report, SolverRow, SweepReport};
 pub use self::run::run;
 pub use self::sweep::Plan;

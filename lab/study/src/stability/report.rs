@@ -1,7 +1,7 @@
 //! What came out of sweeps.
 
 use super::bounds::BoundReport;
-use super::breakdown::{Break, CellReport, Margin, Wrong};
+use super::breakdown::{Break, CellReport, Classes, Margin};
 use crate::machine::Machine;
 
 /// What came out.
@@ -15,6 +15,8 @@ pub struct Report {
     pub detector: String,
     /// Mean distance of its electrodes (m): what a contact missed or invented counts.
     pub reach_m: f64,
+    /// How far off an answer is wrong (m).
+    pub wrong_m: f64,
     /// Seed.
     pub seed: u64,
     /// The seed of the detector as it was built, if everything is simulated on one.
@@ -78,8 +80,8 @@ pub struct SolverRow {
     pub errors: ErrorRange,
     /// The mildest point at which it breaks, if it does.
     pub breaks: Option<Break>,
-    /// Share of wrong answers: the mean over the points.
-    pub wrong: Wrong,
+    /// Of which classes its answers are: the mean over the points.
+    pub classes: Classes,
     /// How much of the sweep's unit it bears.
     pub margin: Option<Margin>,
 }

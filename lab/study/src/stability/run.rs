@@ -1,15 +1,17 @@
 //! All sweeps, run one after the other.
 
 use super::bounds::{BoundReport, Charted};
-use super::breakdown::{CellReport, Wrong, breaks, margin};
+use super::breakdown::{CellReport, Classes, breaks, margin};
 use super::report::{ErrorRange, PointReport, Report, SolverRow, SweepReport};
 use super::sweep::{Bench, Maker, Plan, Point, Sweep};
 use super::trials::Trials;
 use super::{bounds, faults, scenes, shapes, tolerances, wrong};
 use crate::experiment::{Experiment, StudyError};
+use crate::judge::wrong_m;
 use crate::machine::Machine;
 use crate::progress::Progress;
 use crate::scenes::SceneKind;
+use crate::score::Score;
 use tactomo_touch::solve::{Method, ParameterKind};
 
 /// Lambda's sweep, in shares of the largest singular value.
@@ -47,6 +49,7 @@ pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, Stu
         command: command.to_owned(),
         detector: plan.detector.name.clone(),
         reach_m: bench.sound.reach_m(),
+        wrong_m: wrong_m(&bench.sound.detector),
         seed: plan.seed,
         as_built: plan.as_built,
         places: plan.places,
@@ -129,22 +132,30 @@ fn row(
     trials: &mut Trials,
     progress: Progress,
 ) -> Result<Option<SolverRow>, StudyError> {
-    let mut cells = Vec::with_capacity(points.len());
+    let mut scores = Vec::with_capacity(points.len());
     for point in points {
         if progress.is_stopped() {
             return Ok(None);
         }
-        let scores = trials.scores(method, point)?;
-        cells.push(scores.map(|scores| CellReport::of(&scores, point.experiment.reach_m())));
+        scores.push(trials.scores(method, point)?);
     }
     let severities: Vec<f64> = points.iter().map(|point| point.severity).collect();
+    let tried = (0..points.len()).filter(|index| scores[*index].is_some());
+    let harmless = tried.min_by(|a, b| severities[*a].total_cmp(&severities[*b]));
+    let harmless = harmless.and_then(|index| scores[index].clone()).unwrap_or_default();
+    let cell = |(point, scores): (&&Point, &Option<Vec<Score>>)| {
+        let detector = &point.experiment.detector;
+        let lengths_m = [point.experiment.reach_m(), wrong_m(detector)];
+        scores.as_ref().map(|scores| CellReport::of(scores, &harmless, lengths_m))
+    };
+    let mut cells: Vec<_> = points.iter().zip(&scores).map(cell).collect();
     let labels: Vec<&str> = points.iter().map(|point| point.label.as_str()).collect();
     let breaks = breaks(&labels, &severities, &mut cells);
     let errors = ErrorRange::of(&severities, &cells);
     let amounts: Vec<Option<f64>> = points.iter().map(|point| point.amount).collect();
     let margin = margin(&severities, &amounts, &cells);
-    let wrong = Wrong::mean(cells.iter().flatten().map(|cell| cell.wrong));
-    Ok(Some(SolverRow { solver: method.name().to_owned(), cells, errors, breaks, wrong, margin }))
+    let classes = Classes::mean(&cells.iter().flatten().map(|cell| cell.classes).collect::<Vec<_>>());
+    Ok(Some(SolverRow { solver: method.name().to_owned(), cells, errors, breaks, classes, margin }))
 }
 
 #[cfg(test)]
@@ -272,7 +283,7 @@ mod tests {
         let opened: usize = report.sweeps.iter().map(|sweep| sweep.solvers.len() + sweep.calibrated.len()).sum();
         assert_eq!((page.matches("popovertarget=").count(), page.matches("<div popover ").count()), (opened, opened));
         let row = |title: &str| &report.sweeps.iter().find(|sweep| sweep.title == title).unwrap().solvers[0];
-        assert!(row("Noise").wrong.silent > 0.1, "a linear image has no flags for noise");
+        assert!(row("Noise").classes.silent > 0.1, "a linear image has no flags for noise");
         assert!(row("A driving sheet that resists").margin.is_some() && row("A detector that leaks").margin.is_none());
     }
 }

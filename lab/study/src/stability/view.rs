@@ -1,7 +1,7 @@
 //! What the report shows.
 
 use super::bounds::{BoundChart, BoundCurve};
-use super::{Break, Breakdown, CellReport, Margin, Report, SolverRow, SweepReport, Wrong};
+use super::{Break, Breakdown, CellReport, Classes, Margin, Report, SolverRow, SweepReport};
 use crate::view::{Axis, Cell, Chart, Figures, MM, Mark, Outcome, PERCENT, Series, Style, TEXT, Table, Unit, View};
 use tactomo_touch::solve::Method;
 
@@ -21,13 +21,13 @@ const RARE: f64 = 0.005;
 
 /// Where each solver fails and whether it says so, how far off it is, what noise allows, and every point.
 pub fn view(report: &Report) -> View {
-    let lead = "What is **wrong and says nothing of it is the danger**: solid, with ✕. What is wrong and flagged is striped, with ⚑. **Click a cell** for \
-                its curve.";
+    let lead = "What is **wrong and says nothing of it is the danger**: solid, with ✕. What is wrong and flagged is striped, with ⚑; ± is wrong, but within three \
+                of its own standard errors; ○ is as far off without what is varied. **Click a cell** for its curve.";
     let every = "Mean error in mm, where a contact missed or invented counts the mean distance of electrodes. − \
                  contacts are missed, + contacts are invented, slow: a frame takes far longer, ∅ refused, NaN not finite.";
-    let bounds = "Error of each solver, and the Cramer-Rao bound (dashed): no unbiased method can have a smaller root-mean-square error with this \
-                  converter's noise. Where a solver is far above it, its model or its start is what limits it; below it, guesses are biased. Contacts \
-                  missed or invented count the mean distance of electrodes.";
+    let bounds = "Mean error of each solver, and that of normal errors with the covariance of the Cramer-Rao bound (dashed): no unbiased method has a smaller \
+                  covariance with this converter's noise, radii known to a factor of two. Where a solver is far above it, its model or its start is what limits \
+                  it; below it, guesses are biased. Contacts missed or invented count the mean distance of electrodes.";
     let view = View::new("Where solvers break", lead)
         .with(Figures { legend: outcomes(), ..Figures::of("", [overview(report)]) })
         .heading("How far off")
@@ -47,22 +47,38 @@ fn outcomes() -> Vec<(&'static str, String)> {
     Outcome::ALL.map(|(outcome, what)| (outcome.class(), what.to_owned())).into()
 }
 
-/// How a solver fails where it is wrong in such shares of frames.
-fn outcome(wrong: Wrong) -> Outcome {
-    match wrong {
-        Wrong { silent: OFTEN.., .. } => Outcome::Silent,
-        Wrong { silent: RARE.., .. } => Outcome::SometimesSilent,
-        Wrong { flagged: RARE.., .. } => Outcome::Flagged,
-        _ => Outcome::Right,
+/// How a solver fails whose answers are of such classes: silently if any are that, else as most of the wrong ones.
+fn outcome(classes: Classes) -> Outcome {
+    let Classes { flagged, covered, from_start, silent, .. } = classes;
+    match silent {
+        OFTEN.. => Outcome::Silent,
+        RARE.. => Outcome::SometimesSilent,
+        _ if classes.wrong() < RARE => Outcome::Right,
+        _ if flagged >= covered.max(from_start) => Outcome::Flagged,
+        _ if covered >= from_start => Outcome::Covered,
+        _ => Outcome::FromStart,
     }
 }
 
-/// Shares of wrong answers, silent and flagged, in per cent.
-fn shares(wrong: Wrong) -> String {
-    match outcome(wrong) {
+/// Shares of wrong answers in per cent: silent and flagged ones, or the share that most of them are.
+fn shares(classes: Classes) -> String {
+    let per_cent = |share: f64| format!("{:.0}", 100.0 * share);
+    match outcome(classes) {
         Outcome::Right => "0".to_owned(),
-        _ => format!("{:.0} / {:.0}", 100.0 * wrong.silent, 100.0 * wrong.flagged),
+        Outcome::Covered => per_cent(classes.covered),
+        Outcome::FromStart => per_cent(classes.from_start),
+        _ => format!("{} / {}", per_cent(classes.silent), per_cent(classes.flagged)),
     }
+}
+
+/// Shares of all classes, for those who ask.
+fn all_shares(classes: Classes) -> String {
+    let Classes { right, flagged, covered, from_start, silent } = classes;
+    let [right, flagged, covered, from_start, silent] =
+        [right, flagged, covered, from_start, silent].map(|share| format!("{:.0}", 100.0 * share));
+    format!(
+        "of frames {right} % right; wrong: {silent} % silently, {flagged} % with a flag, {covered} % within 3 standard errors, {from_start} % from the start"
+    )
 }
 
 /// How much a solver bears, in multiples of what a good build has.
@@ -90,7 +106,12 @@ fn rows(sweep: &SweepReport) -> impl Iterator<Item = (&SolverRow, &'static str)>
 type Solvers<'a> = (&'a SweepReport, &'static str, &'a [SolverRow]);
 
 /// A row for each sweep, a column for each solver.
-fn sweeps_by_solvers(report: &Report, title: String, note: &str, cell: fn(&SweepReport, &SolverRow) -> Cell) -> Table {
+fn sweeps_by_solvers(
+    report: &Report,
+    title: String,
+    note: &str,
+    cell: impl Fn(&SweepReport, &SolverRow) -> Cell,
+) -> Table {
     let all = report.sweeps.iter().max_by_key(|sweep| sweep.solvers.len());
     let solvers = all.map(|sweep| sweep.solvers.iter().map(|row| row.solver.clone())).into_iter().flatten();
     let rows = |sweep| {
@@ -113,11 +134,15 @@ fn sweeps_by_solvers(report: &Report, title: String, note: &str, cell: fn(&Sweep
 
 fn overview(report: &Report) -> Table {
     let title = format!("{}{}: wrong answers, silent / flagged, % of frames", report.detector, report.whose());
-    let note = "Over all points of a sweep. An answer is wrong if its error is above 15 % of the mean distance of electrodes and twice the solver's own \
-                at the harmless point, if it misses or invents a contact, is refused or not finite. Below: the margin to failure, as multiples of what \
-                a hobbyist's bench gives (docs/detector.md) or of the described converter's noise: the most that holds and the least that breaks; else the \
-                mildest point that breaks it.";
-    sweeps_by_solvers(report, title, note, |sweep, row| {
+    let note = format!(
+        "Over all points of a sweep. An answer is wrong if a contact is off by more than {:.2} mm (15 % of the mean distance of electrodes), missed or invented, if it is \
+         of another kind than what touches, refused or not finite. Below: the margin to failure, as multiples of what a hobbyist's bench gives \
+         (docs/detector.md) or of the described converter's noise: the most that holds and the least at which most answers are wrong; else the mildest \
+         such point.",
+        1e3 * report.wrong_m
+    );
+    let wrong_m = report.wrong_m;
+    sweeps_by_solvers(report, title, &note, move |sweep, row| {
         let first = row.breaks.as_ref();
         let detail = match (row.margin, first) {
             (Some(margin), _) => borne(margin),
@@ -134,44 +159,50 @@ fn overview(report: &Report) -> Table {
         );
         let [harmless, largest] = [row.errors.harmless_m, row.errors.largest_m].map(millimetres);
         Cell {
-            value: shares(row.wrong).into(),
+            value: shares(row.classes).into(),
             detail,
-            outcome: Some(outcome(row.wrong)),
-            tooltip: format!("{breaks}; error in mm, at the harmless point and at most: {harmless} – {largest}"),
-            opens: Some(Box::new(curve(sweep, row))),
+            outcome: Some(outcome(row.classes)),
+            tooltip: format!(
+                "{}; {breaks}; error in mm, at the harmless point and at most: {harmless} – {largest}",
+                all_shares(row.classes)
+            ),
+            opens: Some(Box::new(curve(sweep, row, wrong_m))),
             ..Cell::default()
         }
     })
 }
 
 /// A solver's error over the points of a sweep, and how it fails at each.
-fn curve(sweep: &SweepReport, row: &SolverRow) -> Chart {
+fn curve(sweep: &SweepReport, row: &SolverRow, wrong_m: f64) -> Chart {
     let points = || row.cells.iter().enumerate().filter_map(|(index, cell)| Some((index, cell.as_ref()?)));
     let mark = |(index, cell): (usize, &CellReport)| Mark {
-        note: format!("{}: silent / flagged {} %", sweep.points[index].label, shares(cell.wrong)),
+        note: format!("{}: {}", sweep.points[index].label, all_shares(cell.classes)),
         ..Mark::from((index as f64, cell.error_m))
     };
     let line = Series::line(row.solver.as_str(), class(&row.solver), points().map(mark)).undotted();
     let told = |outcomes: &[Outcome], class, name: &str| {
-        let of = points().filter(|(_, cell)| outcomes.contains(&outcome(cell.wrong))).map(mark);
+        let of = points().filter(|(_, cell)| outcomes.contains(&outcome(cell.classes))).map(mark);
         Series::dots(name, class, of).labelled_last().large()
     };
     let series = [
         line,
         told(&[Outcome::Right], "right", "right"),
+        told(&[Outcome::FromStart], "from-start", "from the start"),
         told(&[Outcome::Flagged], "flagged", "flagged"),
+        told(&[Outcome::Covered], "covered", "within 3 sigma"),
         told(&[Outcome::SometimesSilent, Outcome::Silent], "silent", "silent"),
     ];
     let axes = [
         Axis::named(sweep.title.as_str(), sweep.points.iter().map(|point| point.label.clone())),
         Axis::log("", Unit::Metres).floor(1e-5),
     ];
-    let severities = sweep.points.iter().map(|point| point.severity);
-    let tried = severities.zip(&row.cells).filter_map(|(severity, cell)| Some((severity, cell.as_ref()?)));
-    let harmless = tried.min_by(|(a, _), (b, _)| a.total_cmp(b));
-    let level = harmless.map(|(_, cell)| (cell.limit_m(), "wrong above".to_owned()));
+    let level = Some((wrong_m, "wrong above".to_owned()));
     let margin = row.margin.map_or_else(String::new, |margin| format!("; margin to failure {}", borne(margin)));
-    let subtitle = format!("wrong answers, silent / flagged: {} % of frames{margin}", shares(row.wrong));
+    let subtitle = format!(
+        "wrong silently / flagged: {:.0} / {:.0} % of frames{margin}",
+        100.0 * row.classes.silent,
+        100.0 * row.classes.flagged
+    );
     let title = format!("{}: error of {}", sweep.title, row.solver);
     Chart { level, ..Chart::new(title, subtitle, axes, series).sized([520.0, 320.0]) }
 }
@@ -230,23 +261,21 @@ fn cell(cell: &Option<CellReport>) -> Cell {
     let marks = [
         (cell.not_finite > 0.0, " NaN"),
         (cell.failed > 0.0, " ∅"),
-        (cell.missed >= 0.25, " −"),
-        (cell.invented >= 0.25, " +"),
+        (cell.missed - cell.invented >= 0.25, " −"),
+        (cell.invented - cell.missed >= 0.25, " +"),
         (cell.broken == Some(Breakdown::Slow), " slow"),
     ];
     let marks: String = marks.into_iter().filter(|(is, _)| *is).map(|(_, mark)| mark).collect();
     Cell {
         value: (millimetres(cell.error_m) + &marks).into(),
-        outcome: Some(outcome(cell.wrong)),
+        outcome: Some(outcome(cell.classes)),
         tooltip: format!(
-            "wrong in {:.0} % of frames silently, in {:.0} % with a flag; missed {:.2}, invented {:.2}, conductance off by {} %, p99 {}, flagged in {:.0} % of frames",
-            100.0 * cell.wrong.silent,
-            100.0 * cell.wrong.flagged,
+            "{}; missed {:.2}, invented {:.2} a frame, conductance off by {} %, p99 {}",
+            all_shares(cell.classes),
             cell.missed,
             cell.invented,
             PERCENT.text(cell.conductance_error),
-            Unit::Seconds.text(cell.p99_us * 1e-6),
-            100.0 * cell.flagged
+            Unit::Seconds.text(cell.p99_us * 1e-6)
         ),
         ..Cell::default()
     }
@@ -279,12 +308,15 @@ fn breaks(report: &Report) -> Table {
         .column("breaks at", TEXT, found(|found| found.at.clone()))
         .column("how", TEXT, found(|found| found.how.name().to_owned()))
         .column("", TEXT, found(|found| if found.is_reported { "with a flag" } else { "silently" }.to_owned()))
-        .column("silent", PERCENT, |(_, row, _)| row.wrong.silent)
-        .column("flagged", PERCENT, |(_, row, _)| row.wrong.flagged)
+        .column("right", PERCENT, |(_, row, _)| row.classes.right)
+        .column("silent", PERCENT, |(_, row, _)| row.classes.silent)
+        .column("flagged", PERCENT, |(_, row, _)| row.classes.flagged)
+        .column("within 3 sigma", PERCENT, |(_, row, _)| row.classes.covered)
+        .column("from the start", PERCENT, |(_, row, _)| row.classes.from_start)
         .column("bears", TEXT, |(_, row, _)| row.margin.map_or_else(String::new, borne))
         .column("holds at", PERCENT, |(_, row, _)| row.breaks.as_ref().map_or(1.0, |found| found.survives))
         .note(
-            "A solver holds as long as its error is below 15 % of the mean distance of electrodes or twice its own harmless one: see what that is. \
+            "A solver holds as long as most of its answers are right. \
              Light and firm contacts are 0.03 and 0.3 sheet conductances. --json and --out have every point.",
         )
         .data()
@@ -294,7 +326,7 @@ fn breaks(report: &Report) -> Table {
 fn method(report: &Report) -> String {
     format!(
         "Detector {}{}; {} places at each point, {} frames at each; seed {}. A light contact is 0.03 sheet conductances, a firm one 0.3. Readings come \
-         from a finer model than any that is inverted, with the converter's noise and steps. A contact is missed or invented if it has no partner within \
+         from a finer model than any that is inverted, with the converter's noise and steps. A contact missed or invented counts \
          the mean distance of electrodes, {:.1} mm. Each solver has its defaults.",
         report.detector,
         report.whose(),

@@ -82,7 +82,7 @@ fn floor(trials: &[Trial], group: Group) -> Result<Floor, StudyError> {
 /// Mean distance of contacts from where they are, with normal errors (m).
 fn drawn_m(bounds: &[Bound], noise: &mut Noise) -> f64 {
     let distance_m = |bound: &Bound| {
-        let [long_m, short_m] = bound.axes_any_radius_m.map(|axis_m| axis_m * noise.normal());
+        let [long_m, short_m] = bound.axes_m.map(|axis_m| axis_m * noise.normal());
         long_m.hypot(short_m)
     };
     bounds.iter().map(distance_m).sum::<f64>() / bounds.len().max(1) as f64

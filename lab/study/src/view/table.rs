@@ -125,8 +125,12 @@ pub struct Cell {
 pub enum Outcome {
     /// It does not.
     Right,
+    /// It is as far off without what is varied.
+    FromStart,
     /// It says so where it is wrong.
     Flagged,
+    /// It is wrong within a few of the standard errors that it claims.
+    Covered,
     /// It is wrong at times and says nothing.
     SometimesSilent,
     /// It is often wrong and says nothing.
@@ -135,9 +139,11 @@ pub enum Outcome {
 
 impl Outcome {
     /// All of them, with what they stand for.
-    pub const ALL: [(Self, &str); 4] = [
+    pub const ALL: [(Self, &str); 6] = [
         (Self::Right, "right"),
+        (Self::FromStart, "far off from the start"),
         (Self::Flagged, "wrong, and flagged"),
+        (Self::Covered, "wrong, within 3 standard errors"),
         (Self::SometimesSilent, "wrong at times, silently"),
         (Self::Silent, "often wrong, silently: the danger"),
     ];
@@ -146,7 +152,9 @@ impl Outcome {
     pub fn class(self) -> &'static str {
         match self {
             Self::Right => "right",
+            Self::FromStart => "from-start",
             Self::Flagged => "flagged",
+            Self::Covered => "covered",
             Self::SometimesSilent => "silent-few",
             Self::Silent => "silent",
         }
@@ -156,7 +164,9 @@ impl Outcome {
     pub(super) fn mark(self) -> Option<(&'static str, &'static str)> {
         match self {
             Self::Right => None,
+            Self::FromStart => Some(("○", "from the start")),
             Self::Flagged => Some(("⚑", "flagged")),
+            Self::Covered => Some(("±", "within 3 standard errors")),
             Self::SometimesSilent => Some(("✕", "silent at times")),
             Self::Silent => Some(("✕", "silent")),
         }

@@ -267,14 +267,41 @@ fn rows_of_a_plan_are_refused_and_end_where_a_table_comes() {
     pad.scan(&mut simulation(&[finger([0.01, 0.01])]), 8);
     let told = sink.told();
     assert!(told.len() >= 4 && told.iter().all(|fingers| is_near(fingers[0], [0.01, 0.01])), "{told:?}");
-    // A new table ends the touches of the old one, and the scan.
-    pad.piece(0, &TABLE[..64]);
-    step(&mut pad.board, 16);
-    assert_eq!(sink.told(), [vec![Told { touches: false, ..told.last().unwrap()[0] }]]);
-    let conversions = pad.outside.conversions.get();
-    step(&mut pad.board, 100);
-    assert_eq!(pad.outside.conversions.get(), conversions);
-    assert_eq!(pad.piece(0, &[]).0.usable, None);
+}
+
+/// Neither who asks for the state of the table, nor the same table again, nor one that cannot be used is felt by a finger.
+#[test]
+fn a_finger_stays_while_tables_are_asked_for_and_ends_with_its_own() {
+    let (mut pad, sink) = rested_pad();
+    let mut pressing = simulation(&[finger([0.01, 0.01])]);
+    pad.scan(&mut pressing, 8);
+    let first = sink.told().pop().unwrap();
+    let mut foreign = TABLE.to_vec();
+    foreign[16] ^= 1;
+    pad.piece(0, &[]);
+    for table in [&foreign[..256], &TABLE, &TABLE[..640]] {
+        pad.send(table);
+        pad.scan(&mut pressing, 2);
+        let told = sink.told();
+        assert!(told.len() >= 2 && told.iter().all(|fingers| fingers.len() == 1), "{told:?}");
+        assert!(told.iter().all(|fingers| fingers[0].touches && fingers[0].id == first[0].id), "{told:?}");
+    }
+    let mut other = TABLE.to_vec();
+    let end = other.len() - 4;
+    other[70_000] ^= 1;
+    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&other[..end]);
+    other[end..].copy_from_slice(&checksum.to_le_bytes());
+    // What turns out to be another comes once more.
+    pad.send(&other);
+    let (state, _) = pad.send(&other);
+    assert_eq!(state.usable.map(|table| table.checksum), Some(checksum));
+    sink.told();
+    pad.scan(&mut pressing, 3);
+    let told = sink.told();
+    assert!(told.len() <= 1 && told.iter().flatten().all(|finger| !finger.touches), "rest is not known: {told:?}");
+    pad.scan(&mut simulation(&[]), 80);
+    pad.scan(&mut pressing, 4);
+    assert!(sink.told().len() >= 2, "it goes on with the new one");
 }
 
 #[test]

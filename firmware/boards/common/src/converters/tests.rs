@@ -245,3 +245,72 @@ fn a_restart_brings_units_back_and_throws_a_late_code_away() {
     assert_eq!(converters.convert([Some(3), Some(8)]), [Ok(1050), Ok(2020)]);
     assert_eq!(converters.convert([None, Some(15)])[1], Ok(2090));
 }
+
+/// Registers of a unit that ends a conversion too late: that is done with the next start, in place of the one that was to be started.
+#[derive(Default)]
+struct Late {
+    /// Which units are late next.
+    is_late: [bool; 2],
+    late: [Option<u16>; 2],
+    done: [Option<u16>; 2],
+    looks_until_rest: u32,
+    at_rest: bool,
+    /// What was done: a start of a unit and its channel, a stop, power.
+    calls: Vec<std::string::String>,
+}
+
+impl Units for Late {
+    fn are_at_rest(&mut self) -> bool {
+        self.looks_until_rest = self.looks_until_rest.saturating_sub(1);
+        self.at_rest = self.looks_until_rest == 0;
+        self.at_rest
+    }
+
+    fn start(&mut self, unit: usize, channel: u8) {
+        assert!(self.at_rest, "started while the last conversion goes on");
+        self.calls.push(std::format!("start {unit} {channel}"));
+        let code = 100 * (1 + unit as u16) + u16::from(channel);
+        self.done[unit] = self.late[unit].take();
+        if self.is_late[unit] {
+            (self.is_late[unit], self.late[unit]) = (false, Some(code));
+        } else {
+            self.done[unit] = self.done[unit].or(Some(code));
+        }
+    }
+
+    fn reading(&mut self, unit: usize) -> Option<u16> {
+        self.done[unit].take()
+    }
+
+    fn stop(&mut self, unit: usize) {
+        self.calls.push(std::format!("stop {unit}"));
+    }
+
+    fn power(&mut self, on: bool) {
+        self.calls.push(std::format!("power {on}"));
+        self.at_rest = false;
+    }
+}
+
+#[test]
+fn a_code_that_is_late_is_nobodys_after_a_restart() {
+    for late in [[true, false], [false, true], [true, true]] {
+        let units = Late { is_late: late, looks_until_rest: 100, ..Late::default() };
+        let mut converters = Converters::new(units, CHANNELS);
+        let first = converters.convert([Some(1), Some(9)]);
+        assert_eq!(first, [0, 1].map(|unit| if late[unit] { Err(TimedOut) } else { Ok([103, 203][unit]) }));
+        converters.units.calls.clear();
+        converters.units.looks_until_rest = 100;
+        converters.restart();
+        let expected = ["stop 0", "stop 1", "power false", "power true", "start 0 0", "start 1 0"];
+        assert_eq!(converters.units.calls, expected);
+        for _ in 0..3 {
+            assert_eq!(converters.convert([Some(5), Some(15)]), [Ok(107), Ok(209)], "late: {late:?}");
+        }
+        // One alone starts nothing at the other, and an electrode that is not there nothing at all.
+        converters.units.calls.clear();
+        assert_eq!(converters.convert([None, Some(6)])[1], Ok(200));
+        converters.convert([Some(16), None]);
+        assert_eq!(converters.units.calls, ["start 1 0"]);
+    }
+}

@@ -185,6 +185,8 @@ fn calibrations() -> impl Strategy<Value = Calibration> {
     });
     (directions, prop::option::of("\\PC{0,20}"), "\\PC{0,12}", 0..100_000usize).prop_map(
         |((parameters, directions), board, date, frames)| Calibration {
+            sensor: board.clone().filter(|_| frames % 3 == 0),
+            description: board.clone().filter(|_| frames % 5 == 0),
             board,
             date,
             frames,

@@ -15,6 +15,8 @@ const MOST: usize = 512;
 #[serde(deny_unknown_fields)]
 pub(super) struct CalibrationTable {
     board: Option<String>,
+    sensor: Option<String>,
+    description: Option<String>,
     date: String,
     frames: usize,
     presses: usize,
@@ -61,6 +63,8 @@ impl CalibrationTable {
         Ok(Calibration {
             parameters: self.parameters.iter().zip(&self.standard_errors).map(parameter).collect::<Result<_, _>>()?,
             board: self.board,
+            sensor: self.sensor,
+            description: self.description,
             date: self.date,
             frames: self.frames,
             presses: self.presses,
@@ -78,8 +82,10 @@ impl Calibration {
         };
         let errors: Vec<f64> = self.parameters.iter().map(|known| known.standard_error).collect();
         writeln!(text, "\n[calibration]")?;
-        if let Some(board) = &self.board {
-            writeln!(text, "board = {}", quoted(board))?;
+        for (name, told) in [("board", &self.board), ("sensor", &self.sensor), ("description", &self.description)] {
+            if let Some(told) = told {
+                writeln!(text, "{name} = {}", quoted(told))?;
+            }
         }
         writeln!(text, "date = {}\nframes = {}\npresses = {}", quoted(&self.date), self.frames, self.presses)?;
         if let Some(error_m) = self.place_error_m {

@@ -10,9 +10,10 @@ mod topology;
 mod weld;
 
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
+
+use tactomo_table::file::{self, Format};
 
 use self::map::Map;
 pub use self::read::FormatError;
@@ -20,8 +21,8 @@ pub use self::topology::edges_of;
 use super::Outline;
 use crate::space::{self, Place};
 
-/// No surface's file is longer (bytes).
-const MAX_BYTES: u64 = 64 << 20;
+/// A surface's file.
+const FORMAT: Format = Format::new("a detector's surface", 64 << 20);
 /// Units that a file may be in, and their lengths (m).
 const UNITS: [(&str, f64); 4] = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254)];
 
@@ -77,16 +78,8 @@ impl Surface {
     /// # Errors
     /// [`SurfaceError`], which says where in the file and what is allowed.
     pub fn read(path: &Path, named: &str, unit: &str) -> Result<Self, SurfaceError> {
-        if !path.metadata()?.is_file() {
-            // A pipe would be waited for, and a device has no end.
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no file").into());
-        }
-        let mut bytes = Vec::new();
-        File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > MAX_BYTES {
-            return Err(io::Error::new(io::ErrorKind::FileTooLarge, "it is longer than 64 MiB").into());
-        }
-        Self::parse(&bytes, named, unit)
+        file::check_regular(path)?;
+        Self::parse(&FORMAT.read(path)?, named, unit)
     }
 
     /// Reads a surface from a file's bytes; `named` is the file, `unit` that of its lengths.

@@ -135,10 +135,13 @@ proptest! {
 #[test]
 fn whole_skins_are_patches_and_deep_ones_end() {
     for skin in SKINS {
-        assert!(of_text(skin, &PathBuf::from("skin.toml")).is_ok());
+        assert!(of_text(skin, &PathBuf::from("skin.toml"), words).is_ok());
     }
     for deep in ["[", "patch = [", "[[patch]]\nname = \"a\"\nport = [", "a.", "{a="] {
         let (first, rest) = deep.split_at(deep.len() - 1);
-        assert!(of_text(&format!("{first}{}", rest.repeat(100_000)), &PathBuf::from("skin.toml")).is_err(), "{deep}");
+        assert!(
+            of_text(&format!("{first}{}", rest.repeat(100_000)), &PathBuf::from("skin.toml"), words).is_err(),
+            "{deep}"
+        );
     }
 }

@@ -16,6 +16,7 @@ import { Connection } from "./protocol.js";
 import { Notice } from "./notice.js";
 import { ReadingsMap } from "./readings.js";
 import { saveData, saveHistory, savePicture } from "./save.js";
+import { offerAddress } from "./share.js";
 import { Simulation } from "./simulation.js";
 import { StripChart } from "./strip.js";
 import { listenForTheme, theme } from "./theme.js";
@@ -41,6 +42,7 @@ const rezeroButton = new RezeroButton(send);
 let parts = null;
 let waiting = null;
 let shown = null;
+let held;
 let frozen = false;
 
 function start(setup) {
@@ -62,6 +64,7 @@ function start(setup) {
   };
   const [[left, bottom], [right, top]] = setup.bounds_m;
   document.getElementById("picture").classList.toggle("wide", right - left > WIDE * (top - bottom));
+  offerAddress(setup);
   const plot = document.getElementById("plot");
   plot.classList.toggle("pressable", setup.simulated);
   plot.tabIndex = setup.simulated ? 0 : -1;
@@ -91,18 +94,28 @@ function draw(now) {
 }
 
 function show(update, now) {
-  shown = update;
   parts.history.take(update, now);
-  const isTold = parts.told.take(update, now);
-  parts.picture.show(update, now);
   parts.readings.show(update, now);
   parts.strip.draw(now);
   parts.pointer.show(update, now);
-  if (isTold) tell(update);
   vibration.draw(now);
-  verdict.show(update, parts.method.explanation, now);
+  reveal(update, now);
   dataset.sequence = String(update.sequence);
   dataset.updates = String(Number(dataset.updates ?? 0) + 1);
+}
+
+// Draws what is said of an update, and what it says once that may be told.
+function reveal(update, now) {
+  const turn = parts.told.take(update, now);
+  clearTimeout(held);
+  if (turn === "held") {
+    // Perhaps no other comes.
+    held = setTimeout(() => frozen || reveal(update, performance.now()), parts.told.left(now));
+    return;
+  }
+  shown = update;
+  parts.picture.show(update, now);
+  if (turn === "told") tell(update);
 }
 
 // What is written of it.
@@ -110,6 +123,7 @@ function tell(update) {
   parts.table.show(update);
   parts.totals.show(update);
   parts.readings.tell();
+  verdict.show(update, parts.method.explanation);
 }
 
 function update(message) {

@@ -8,7 +8,7 @@ const lengthM = ({ from, to }) => Math.hypot(to[0] - from[0], to[1] - from[1]);
 
 /** What a passer-by calls it. */
 export function nameOf(shape) {
-  return shape.kind === "line" ? `Line, ${millimetres(lengthM(shape), 0)} mm` : `Ring, ${millimetres(2 * shape.radiusM, 0)} mm across`;
+  return shape.kind === "line" ? `Line, ${millimetres(lengthM(shape), 0)} mm` : `Ring, ${millimetres(2 * shape.radiusM, 0)} mm`;
 }
 
 /** Where it is, in millimetres: the ends of a line, the middle of a ring. */

@@ -71,9 +71,10 @@ export class Board {
       ["Source", setup.source],
       ["Board", hello ? `${hello.board}, firmware ${hello.firmware}` : "has not answered yet"],
       ["Converter", hello ? `${hello.adc_bits} bits of ${fixed(hello.full_scale_v, 2)} V; drive ${fixed(hello.drive_v, 2)} V` : ""],
-      ["Scan", hello ? scanned(scan, setup.electrodes.length, statistics.frames_per_s) : ""],
       ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes`],
       ["Images", `${count(setup.nodes_m.length)} points`],
+      // Last, for it may take a line or two.
+      ["Scan", hello ? scanned(scan, setup.electrodes.length, statistics.frames_per_s) : ""],
     ];
     this.#list(rows);
     if (hello) this.#showSettings(hello);

@@ -1,11 +1,12 @@
 // The contacts found, as a table.
 
 import { errorOf, placesOf } from "./bars.js";
+import { inPlaceOfContacts } from "./headline.js";
 import { ellipseOf } from "./marks.js";
 import { hueOf } from "./palette.js";
 import { barOf, strengthOf, valueOf, wordOf } from "./strength.js";
 import { count, millimetres, withError, withPrefix } from "./units.js";
-import { inPlaceOfContacts } from "./verdict.js";
+import { write } from "./words.js";
 
 // Rows that there is place for.
 const ROWS = 6;
@@ -42,8 +43,8 @@ function titleOf({ forceN = null, forceErrorN, beyondMaximum, conductanceS, erro
 }
 
 function strengthText(contact) {
-  const { forceN, forceErrorN, beyondMaximum } = contact;
-  return forceN === null || beyondMaximum ? strengthOf(contact) : withError(forceN, forceErrorN, "N");
+  const { forceN, forceErrorN, beyondMaximum, prefix } = contact;
+  return forceN === null || beyondMaximum ? strengthOf(contact) : withError(forceN, forceErrorN, "N", prefix);
 }
 
 function row(contact, sheetS) {
@@ -70,6 +71,7 @@ export class ContactTable {
     this.rest = document.getElementById("no-contacts");
     this.strength = document.getElementById("strength");
     this.more = document.getElementById("more-contacts");
+    this.table = this.body.parentElement;
   }
 
   /** Shows the contacts of the update that is told. */
@@ -78,7 +80,9 @@ export class ContactTable {
     const sorted = [...contacts].sort((a, b) => (a.id ?? 0) - (b.id ?? 0) || valueOf(b) - valueOf(a));
     const rows = shape ? [shapeRow(shape, this.sheetS)] : sorted.slice(0, ROWS).map((contact) => row(contact, this.sheetS));
     this.body.replaceChildren(...rows);
-    this.strength.textContent = contacts.some(({ forceN }) => forceN !== null) ? "force" : "firmness";
+    // Where nothing touches, the words of before stay.
+    if (contacts.length) write(this.strength, contacts.some(({ forceN }) => forceN !== null) ? "force" : "firmness");
+    this.table.classList.toggle("forces", this.strength.textContent === "force");
     this.rest.hidden = rows.length > 0;
     this.rest.textContent = inPlaceOfContacts(update);
     this.more.textContent = contacts.length > ROWS ? `and ${count(contacts.length - ROWS)} more` : "";

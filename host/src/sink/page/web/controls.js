@@ -30,16 +30,17 @@ export class RecordButton {
   toggle() { if (!this.button.disabled) this.send({ record: !this.recording }); }
 
   /** Sets a mark in the recording. */
-  mark() { if (!this.markButton.hidden) this.send({ mark: "" }); }
+  mark() { if (!this.markButton.disabled) this.send({ mark: "" }); }
 
   /** Shows a status message. */
   show({ recording, marks, playing }) {
     this.recording = Boolean(recording);
-    this.markButton.hidden = !recording;
+    this.markButton.hidden = playing.kind === "recording";
+    this.markButton.disabled = !recording;
     this.markButton.textContent = marks ? `Mark (${marks})` : "Mark";
     this.button.hidden = playing.kind === "recording";
     this.button.setAttribute("aria-pressed", String(this.recording));
-    this.button.textContent = recording ? "Stop recording" : "Record";
+    this.button.textContent = recording ? "Stop" : "Record";
   }
 }
 
@@ -59,9 +60,8 @@ export class RezeroButton {
   }
 
   /** Shows a status message. */
-  show({ rezeroing, rezeros, link, playing }) {
+  show({ rezeroing, rezeros, link }) {
     this.button.disabled = link.state !== "streaming";
-    this.button.hidden = playing.kind === "recording" && link.state !== "streaming";
     const done = !rezeroing && (this.busy || (this.rezeros !== null && rezeros > this.rezeros));
     [this.busy, this.rezeros] = [rezeroing, rezeros];
     document.documentElement.dataset.rezeros = String(rezeros);

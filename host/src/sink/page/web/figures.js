@@ -17,8 +17,8 @@ const FIGURES = [
   ["median age", "Half of the answers are younger than this when they are ready, since the last byte of their frame came", ({ age_us: age }) => microseconds(age.p50)],
   ["answers/s", "Answers over the last second", ({ solved_per_s: rate }) => [count(rate), ""]],
   ["99 % age", "99 of 100 answers are younger than this when they are ready", ({ age_us: age }) => microseconds(age.p99)],
-  ["skipped", "Frames that have no answer of their own, because newer ones had come: they count in its mean", ({ skipped }) => [count(skipped), ""]],
   ["all frames", "Frames received whole since the start; the mean of several scans each where the line is slower than the scan", ({ frames, folded }) => [count(frames), folded > 0.05 * frames ? `of ${fixed(1 + folded / frames, 1)} scans` : ""]],
+  ["skipped", "Frames that have no answer of their own, because newer ones had come: they count in its mean", ({ skipped }) => [count(skipped), ""]],
   ["lost on the line", "Frames that the board sent and that did not come, since the start", ({ dropped }) => [count(dropped), ""], ({ dropped }) => dropped],
   ["corrupt", "Pieces of what the board sent that could not be read, since the start", ({ corrupt }) => [count(corrupt), ""], ({ corrupt }) => corrupt],
 ];

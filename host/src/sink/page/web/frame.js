@@ -3,7 +3,7 @@
 import { colourMaps, css } from "./colours.js";
 import { sizeCanvas } from "./layout.js";
 import { faded } from "./palette.js";
-import { decimalsOf, fixed, niceStep, prefixOf, ticks } from "./units.js";
+import { decimalsOf, fixed, niceStep, ticks } from "./units.js";
 
 const FONT = "11.5px system-ui, sans-serif";
 const BAR = { gap: 18, narrowGap: 8, width: 12 };
@@ -112,7 +112,7 @@ export function drawBar(context, { left, width, top, height, narrow }, { scale, 
   context.lineWidth = 1;
   context.strokeStyle = colours.edge;
   context.stroke();
-  const { factor, symbol } = prefixOf(scale.max);
+  const { factor, symbol } = scale.prefixNow;
   context.fillStyle = colours.muted;
   for (let i = 0; i <= BAR_MARKS; i += 1) {
     const value = scale.max * (i / BAR_MARKS) ** 2;

@@ -1,4 +1,4 @@
-// One line for what the program has to say: what was refused, what to know of the baseline and the calibration, where the recording is. It goes when its
+// One line for what the program has to say: what was refused, what to know of the baseline, the wires and the calibration, where the recording is. It goes when its
 // cause goes, or when it was read.
 
 import { write } from "./words.js";
@@ -16,10 +16,10 @@ export class Notice {
   }
 
   /** Shows that of a status message. */
-  show({ refused, baseline, calibration, recording, solver, playing }) {
+  show({ refused, baseline, wires, calibration, recording, solver, playing }) {
     const method = solver?.refused ? `This method cannot be used: ${solver.refused}` : null;
     const damage = playing.damage ? `This recording is damaged: ${playing.damage}` : null;
-    const warning = damage ?? baseline ?? calibration;
+    const warning = damage ?? baseline ?? wires ?? calibration;
     const told = refused ?? method ?? warning ?? (recording ? `Recording to ${recording}` : "");
     write(this.text, told);
     this.text.title = told;

@@ -84,6 +84,11 @@ function total(numbers) {
   return conductanceS === null ? null : { forceN: numbers.total_force_n, conductanceS, centreM: [x, y] };
 }
 
+// Where nothing was found by a board that reads nothing below a voltage: that, and whether any reading is above it.
+function floor(numbers) {
+  return numbers.floor_v === null ? null : { floorV: numbers.floor_v, isPressed: numbers.above_floor === 1 };
+}
+
 // What the pointer has done, if a contact is one.
 function pointer(numbers) {
   const [x, y, clicks] = [numbers.pointer_x_m, numbers.pointer_y_m, numbers.pointer_clicks];
@@ -120,6 +125,7 @@ export function decodeUpdate(buffer, layout) {
     certainty: numbers.certainty,
     otherContacts: numbers.other_contacts,
     total: total(numbers),
+    floor: floor(numbers),
     ageS: numbers.age_s,
     image: arrays.image_s_per_m2,
     readings: arrays.readings_v,

@@ -3,7 +3,7 @@
 import { colourMaps, css } from "./colours.js";
 import { SteadyScale } from "./scale.js";
 import { gradient, label, line, svg } from "./svg.js";
-import { decimalsOf, fixed, niceStep, prefixOf, ticks } from "./units.js";
+import { decimalsOf, fixed, niceStep, ticks } from "./units.js";
 import { write } from "./words.js";
 
 const MARGIN = { left: 40, right: 6, top: 4, bottom: 66 };
@@ -105,7 +105,7 @@ export class ReadingsMap {
 
   #bar(y) {
     const { max } = this.scale;
-    const { factor, symbol } = prefixOf(max);
+    const { factor, symbol } = this.scale.prefixNow;
     const step = niceStep(max, 5);
     const colours = Array.from(colourMaps(this.theme).readings).filter((_, i) => i % 5 === 0).map(css);
     const marks = ticks(0, max, step).flatMap((value) => {

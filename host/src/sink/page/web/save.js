@@ -1,7 +1,30 @@
 // Files for the person: the picture as PNG, the readings and contacts as CSV, the history as CSV.
 
-const FIELDS = ["id", "x_m", "y_m", "z_m", "conductance_s", "conductance_error_s", "apparent_conductance_s", "radius_m",
-  "force_n", "force_error_n", "force_beyond_maximum", "x_error_m", "y_error_m", "correlation"];
+// Columns of a table, by the names that every output has (docs/solvers.md), and what stands in them. Those of the frame are the same in each row.
+const FRAME = {
+  sequence: (update) => update.sequence,
+  time_s: (update) => update.timeS,
+  residual: (update) => update.residual,
+  certainty: (update) => update.certainty,
+};
+const CONTACT = {
+  id: (c) => c.id,
+  x_m: (c) => c.place[0],
+  y_m: (c) => c.place[1],
+  z_m: (c) => c.place[2],
+  conductance_s: (c) => c.conductanceS,
+  apparent_conductance_s: (c) => c.apparentS,
+  radius_m: (c) => c.radiusM,
+  force_n: (c) => c.forceN,
+  force_deviation_n: (c) => c.forceErrorN,
+  force_beyond_maximum: (c) => (c.forceN === null ? null : c.beyondMaximum),
+  sigma_x_m: (c) => c.xErrorM,
+  sigma_y_m: (c) => c.yErrorM,
+  correlation: (c) => c.correlation,
+  sigma_conductance_s: (c) => c.errorS,
+  depth_m: (c) => c.depthM,
+  area_m2: (c) => c.areaM2,
+};
 
 const stamp = () => new Date().toISOString().slice(0, 19).replace("T", "-").replaceAll(":", "");
 
@@ -30,14 +53,20 @@ export function savePicture(layers, background) {
   whole.toBlob((blob) => download(blob, `tactomo-${stamp()}.png`));
 }
 
-/** An update as CSV: the contacts, also those beside a shape, an empty line, the readings, a row for each grounded electrode. */
-export function csvOf({ contacts, beside = [], readings, electrodes }) {
-  const cell = (value) => (value === null ? "" : String(value));
-  const force = (c) => [c.forceN, c.forceErrorN, c.forceN === null ? null : Number(c.beyondMaximum)];
-  const contact = (c) => [c.id, ...c.place, c.conductanceS, c.errorS, c.apparentS ?? null, c.radiusM, ...force(c), c.xErrorM, c.yErrorM, c.correlation].map(cell).join(",");
-  const heads = ["grounded", ...Array.from({ length: electrodes }, (_, e) => `electrode_${e}_v`)];
-  const row = (g) => [g, ...readings.slice(g * electrodes, (g + 1) * electrodes)].join(",");
-  return `${[FIELDS.join(","), ...[...contacts, ...beside].map(contact), "", heads.join(","), ...Array.from({ length: electrodes }, (_, g) => row(g))].join("\n")}\n`;
+/**
+ * An update as one table: a row for each contact, also those beside a shape, or one without; in each the frame's figures before, and after them
+ * its readings (V), `readings_v_3_5` of electrode 5 while 3 is grounded. What is not known is empty.
+ */
+export function csvOf(update) {
+  const { contacts, beside = [], readings, electrodes } = update;
+  const found = [...contacts, ...beside];
+  const places = Array.from(readings, (_, k) => `readings_v_${Math.floor(k / electrodes)}_${k % electrodes}`);
+  const frame = Object.values(FRAME).map((of) => of(update));
+  const contact = (c) => Object.values(CONTACT).map((of) => c && of(c));
+  const row = (c, index) => [...frame, c && index, ...contact(c), ...readings];
+  const heads = [...Object.keys(FRAME), "contact", ...Object.keys(CONTACT), ...places];
+  const rows = (found.length ? found : [null]).map(row);
+  return `${[heads, ...rows].map((cells) => cells.map((cell) => cell ?? "").join(",")).join("\n")}\n`;
 }
 
 /** Saves an update as CSV. */

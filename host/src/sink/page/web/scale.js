@@ -1,6 +1,8 @@
 // The upper end of a colour scale. It is steady, so that a harder press looks harder; robust, so that one odd frame changes
 // nothing; and never so high that what is there cannot be seen.
 
+import { HeldPrefix } from "./units.js";
+
 // Peaks of which the median counts: two odd frames among them change nothing.
 const PEAKS = 7;
 const PEAK_AGE_MS = 400;
@@ -26,12 +28,23 @@ export class SteadyScale {
     this.since = 0;
     this.last = null;
     this.isFixed = false;
+    this.prefix = new HeldPrefix();
   }
+
+  /** The SI prefix that its marks are written with. */
+  get prefixNow() { return this.prefix.of(this.max, performance.now()); }
 
   /** Ends at `max` whatever comes; at null it follows again what comes. */
   fix(max) {
     this.isFixed = max !== null;
     if (this.isFixed) this.max = max;
+  }
+
+  /** Is also that of a detector whose scale is never less than `floor` and begins with `max`; the scale itself. */
+  least(floor, max) {
+    this.floor = Math.max(this.floor, floor);
+    this.max = Math.max(this.max, max);
+    return this;
   }
 
   /** Takes the largest value of a frame at time `now` (ms); says whether `max` changed. */

@@ -12,8 +12,8 @@ export const valueOf = (contact) => contact.forceN ?? conductanceOf(contact);
 export function strengthOf(contact) {
   const value = valueOf(contact);
   if (value === null) return "\u2013";
-  const { forceN = null, beyondMaximum } = contact;
-  return forceN === null ? withPrefix(value, "S") : `${beyondMaximum ? "\u2273\u2009" : ""}${withPrefix(value, "N")}`;
+  const { forceN = null, beyondMaximum, prefix } = contact;
+  return forceN === null ? withPrefix(value, "S", 3, prefix) : `${beyondMaximum ? "\u2273\u2009" : ""}${withPrefix(value, "N", 3, prefix)}`;
 }
 
 // Conductance over the sheet conductance: up to the first a touch is so light that linear theory describes it, from the second on a contact conducts

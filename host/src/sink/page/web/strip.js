@@ -2,13 +2,14 @@
 
 import { sizeCanvas } from "./layout.js";
 import { faded, palette } from "./palette.js";
-import { decimalsOf, fixed, niceStep, prefixOf, ticks, withPrefix } from "./units.js";
-import { write } from "./words.js";
+import { decimalsOf, fixed, HeldPrefix, niceStep, ticks, withPrefix } from "./units.js";
 
 const MARGIN = { left: 34, right: 8, top: 8, bottom: 18 };
 // Samples are no closer, and less than a pixel's time changes nothing that can be seen.
 const DRAWN_EVERY_MS = 40;
 const FONT = "11px system-ui, sans-serif";
+// From one value beside the pointer to the next (pixels).
+const VALUE_HEIGHT = 13;
 
 // The largest value that lasts: the lesser of two after each other, so that one odd sample does not flatten all others, and a click shows.
 function lastingMost(line) {
@@ -20,10 +21,11 @@ function lastingMost(line) {
 
 /** Draws a [History]. */
 export class StripChart {
-  constructor(history) {
+  constructor(history, names = null) {
     this.history = history;
+    this.names = names;
     this.canvas = document.getElementById("strip");
-    this.text = document.getElementById("strip-text");
+    this.prefix = new HeldPrefix();
     this.spanMs = 10_000;
     this.shown = -Infinity;
     this.hover = null;
@@ -88,7 +90,7 @@ export class StripChart {
 
   #drawAxes() {
     const { context, width, colours, history } = this;
-    const { factor, symbol } = prefixOf(this.most);
+    const { factor, symbol } = this.prefix.of(this.most, performance.now());
     const step = niceStep(this.most, 3);
     context.font = FONT;
     context.textBaseline = "middle";
@@ -136,17 +138,31 @@ export class StripChart {
     const moment = inside ? end - ((this.width - MARGIN.right - this.hover) / (this.width - MARGIN.left - MARGIN.right)) * this.spanMs : end;
     const values = history.at(moment).sort(([a], [b]) => a - b);
     this.canvas.dataset.values = JSON.stringify(Object.fromEntries(values));
-    if (inside) {
-      context.fillStyle = faded(colours.ink, 0.5);
-      context.fillRect(this.hover, MARGIN.top, 1, this.height - MARGIN.top - MARGIN.bottom);
-      for (const [id, value] of values) {
-        context.beginPath();
-        context.arc(this.hover, this.#y(value), 3.5, 0, 2 * Math.PI);
-        context.fillStyle = colours.hue(id);
-        context.fill();
-      }
+    if (!inside) return;
+    context.fillStyle = faded(colours.ink, 0.5);
+    context.fillRect(this.hover, MARGIN.top, 1, this.height - MARGIN.top - MARGIN.bottom);
+    const isLeft = this.hover < this.width / 2;
+    [context.textAlign, context.lineWidth, context.strokeStyle] = [isLeft ? "left" : "right", 4, colours.card];
+    const say = (words, y, colour) => {
+      const x = this.hover + (isLeft ? 8 : -8);
+      context.strokeText(words, x, y);
+      context.fillStyle = colour;
+      context.fillText(words, x, y);
+    };
+    say(`${fixed((moment - end) / 1e3, 1)} s`, this.height - MARGIN.bottom - 6, colours.muted);
+    // From the lowest up, each above the one before.
+    let room = this.height - MARGIN.bottom - 6;
+    for (const [id, value] of values.sort(([, a], [, b]) => a - b)) {
+      const y = this.#y(value);
+      context.beginPath();
+      context.arc(this.hover, y, 3.5, 0, 2 * Math.PI);
+      context.fillStyle = colours.hue(id);
+      context.fill();
+      room = Math.min(y, room - VALUE_HEIGHT);
+      say(`${this.named(id)} ${withPrefix(value, history.unit)}`, room, colours.hue(id));
     }
-    const words = values.map(([id, value]) => `${id || "all"}: ${withPrefix(value, history.unit)}`);
-    write(this.text, inside ? `${fixed((moment - end) / 1e3, 1)} s  ${words.join("  ") || "nothing"}` : "");
   }
+
+  /** What the line of that number is called. */
+  named(id) { return this.names?.[id - 1] ?? (id ? String(id) : "all"); }
 }

@@ -4,11 +4,14 @@ import { drawOutline } from "./bars.js";
 import { HeatCanvas } from "./flat.js";
 import { HeatField } from "./heat.js";
 import { sizeCanvas } from "./layout.js";
+import { headlineOf } from "./headline.js";
 import { linkOf } from "./link.js";
 import { drawMark } from "./marks.js";
-import { palette } from "./palette.js";
+import { hueOf, palette } from "./palette.js";
 import { scaleOf } from "./picture.js";
 import { Connection } from "./protocol.js";
+import { strengthOf } from "./strength.js";
+import { Told } from "./told.js";
 import { write } from "./words.js";
 
 // About the outline (pixels).
@@ -21,34 +24,39 @@ function make(kind, className, parent) {
   return element;
 }
 
-function wordsOf({ contacts, shape }) {
-  if (shape) return shape.kind === "line" ? "a line" : "a ring";
-  if (!contacts.length) return "nothing touches";
-  return contacts.length === 1 ? "1 contact" : `${contacts.length} contacts`;
-}
-
-/** The tile of the detector of this name; tells `known(tile)` when it knows its detector, `changed()` when how it fares has, `drawn(tile)` when what touches may have. */
+/**
+ * The tile of the detector of this name; tells `known(tile)` when it knows its detector, `changed()` when how it fares has, `drawn(tile)` when what touches
+ * may have, `shown(now)` when it is about to show something. Its colours are on the `scale` of all.
+ */
 export class Tile {
   isLive = false;
   isTouched = false;
   drawn = false;
   setup = null;
   waiting = null;
-  name; theme; told; text; colours; scale; field; heat; at; over;
+  update = null;
+  isPlayed = false;
+  recording = null;
+  refused = null;
+  answer = new Told();
+  name; theme; told; text; colours; scale; field; heat; at; over; held; total;
 
-  constructor(name, theme, told) {
+  constructor([name, index], theme, told) {
     Object.assign(this, { name, theme, told });
     this.element = make("a", "tile card", null);
     this.element.href = `${name}/`;
     const head = make("span", "tile-head", this.element);
-    make("strong", "", head).textContent = name;
+    const title = make("strong", "", head);
+    make("span", `swatch ${hueOf(index + 1)}`, title);
+    title.append(name);
     this.said = make("span", "muted", head);
+    this.total = make("span", "tile-total", head);
     this.plot = make("span", "tile-plot", this.element);
     this.heatElement = make("canvas", "", this.plot);
     this.marksElement = make("canvas", "", this.plot);
     this.connection = new Connection({
       setup: (setup) => this.#start(setup),
-      status: (status) => this.#tell(linkOf(status)),
+      status: (status) => this.#status(status),
       update: (update) => this.#update(update),
       lost: (reason) => this.#tell({ state: "unreachable", text: reason || "The program does not answer; trying again" }),
     }, `${name}/`);
@@ -59,10 +67,21 @@ export class Tile {
       if (JSON.stringify(setup) !== this.text) location.reload();
       return;
     }
-    Object.assign(this, { setup, text: JSON.stringify(setup), colours: palette(), scale: scaleOf(setup), field: new HeatField(setup) });
+    Object.assign(this, { setup, text: JSON.stringify(setup), colours: palette(), scale: this.told.scale(scaleOf(setup)), field: new HeatField(setup) });
     this.heat = new HeatCanvas(this.heatElement, this.field);
     this.layOut();
     this.told.known(this);
+  }
+
+  /** Records it from now on, or no longer. */
+  record(on) {
+    if (this.isLive && !this.isPlayed && on !== Boolean(this.recording)) this.connection.send({ record: on });
+  }
+
+  #status(status) {
+    const { recording, refused, playing } = status;
+    Object.assign(this, { recording, refused, isPlayed: playing.kind === "recording" });
+    this.#tell(linkOf(status));
   }
 
   #tell({ state, text }) {
@@ -83,20 +102,33 @@ export class Tile {
   #show(now) {
     const update = this.waiting;
     this.waiting = null;
-    if (this.setup) {
-      const { contacts, shape } = update;
-      this.field.take(update);
-      this.scale.take(this.field.peak, now);
-      this.draw();
-      const isTouched = contacts.length > 0 || shape !== null || update.image.length > 0;
-      write(this.said, wordsOf(update));
-      this.drawn = true;
-      const wasTouched = this.isTouched;
-      this.isTouched = isTouched;
-      if (isTouched || wasTouched) this.told.drawn(this);
-      if (isTouched !== wasTouched) this.told.changed();
-    }
+    if (this.setup) this.#reveal(update, now);
     this.connection.taken();
+  }
+
+  // As on its own page: one answer, drawn whole.
+  #reveal(update, now) {
+    const turn = this.answer.take(update, now);
+    clearTimeout(this.held);
+    if (turn === "held") {
+      this.held = setTimeout(() => this.#reveal(update, performance.now()), this.answer.left(now));
+      return;
+    }
+    const { contacts, shape } = update;
+    this.update = update;
+    this.field.take(update);
+    this.told.shown(now);
+    this.draw();
+    const isTouched = contacts.length > 0 || shape !== null || update.image.length > 0;
+    if (turn === "told") {
+      write(this.said, headlineOf(update));
+      write(this.total, update.total ? strengthOf(update.total) : "\u2013");
+    }
+    this.drawn = true;
+    const wasTouched = this.isTouched;
+    this.isTouched = isTouched;
+    if (isTouched || wasTouched) this.told.drawn(this);
+    if (isTouched !== wasTouched) this.told.changed();
   }
 
   /** Colours of another theme. */

@@ -1,6 +1,7 @@
 // What all contacts together press with, and where: what is seen from across the room.
 
-import { millimetres, withPrefix } from "./units.js";
+import { strengthOf } from "./strength.js";
+import { millimetres } from "./units.js";
 import { write } from "./words.js";
 
 /** Their sum and its centre, as the program has them. */
@@ -13,11 +14,11 @@ export class Totals {
 
   /** Shows those of the update that is told. */
   show({ total }) {
-    write(this.name, total && total.forceN !== null ? "force" : "firmness");
-    write(this.total, total ? strengthText(total) : "\u2013");
-    write(this.centre, total ? `${total.centreM.map((m) => millimetres(m, 1)).join(", ")} mm` : "\u2013");
+    // Where nothing touches, the word of before stays.
+    if (total) write(this.name, total.forceN === null ? "firmness" : "force");
+    write(this.total, total ? strengthOf(total) : "\u2013");
+    // Several detectors have no centre.
+    if (this.centre) write(this.centre, total ? `${total.centreM.map((m) => millimetres(m, 1)).join(", ")} mm` : "\u2013");
     document.documentElement.dataset.total = String(total ? total.forceN ?? total.conductanceS : 0);
   }
 }
-
-const strengthText = ({ forceN, conductanceS }) => (forceN === null ? withPrefix(conductanceS, "S") : withPrefix(forceN, "N"));

@@ -11,6 +11,24 @@ export function prefixOf(value) {
   return { factor, symbol };
 }
 
+// A smaller prefix takes the place of a larger one once that was too large for so long: a number that goes about a thousand keeps its unit.
+const HELD_MS = 1000;
+
+/** The prefix of a number that changes. */
+export class HeldPrefix {
+  held = null;
+  needed = -Infinity;
+
+  /** The one to write `value` with at time `now` (ms), as `{factor, symbol}`. */
+  of(value, now) {
+    const own = prefixOf(value);
+    const isNeeded = !this.held || own.factor >= this.held.factor;
+    if (isNeeded) this.needed = now;
+    if (isNeeded || now - this.needed >= HELD_MS) this.held = own;
+    return this.held;
+  }
+}
+
 /** `value` with fixed decimals and a true minus sign. */
 export const fixed = (value, decimals) => {
   const text = value.toFixed(decimals);
@@ -20,20 +38,18 @@ export const fixed = (value, decimals) => {
 /** Metres as millimetres, without the unit. */
 export const millimetres = (metres, decimals) => fixed(metres * 1e3, decimals);
 
-/** `value` with three significant digits, or so many, and the unit with an SI prefix. */
-export function withPrefix(value, unit, digits = 3) {
-  const { factor, symbol } = prefixOf(value);
+/** `value` with three significant digits, or so many, and the unit with an SI prefix, its own or that one. */
+export function withPrefix(value, unit, digits = 3, { factor, symbol } = prefixOf(value)) {
   const whole = Math.floor(Math.log10(Math.max(1, Math.abs(value / factor))) + 1e-6) + 1;
   return `${fixed(value / factor, Math.max(0, digits - whole))}\u2009${symbol}${unit}`;
 }
 
 /** `value ± error` with the prefix and the decimals of the value. */
-export function withError(value, error, unit) {
-  const text = withPrefix(value, unit);
+export function withError(value, error, unit, prefix = prefixOf(value)) {
+  const text = withPrefix(value, unit, 3, prefix);
   if (error === null) return text;
   const decimals = /[.](\d+)/.exec(text)?.[1].length ?? 0;
-  const { factor } = prefixOf(value);
-  return text.replace("\u2009", ` ± ${fixed(error / factor, decimals)}\u2009`);
+  return text.replace("\u2009", ` ± ${fixed(error / prefix.factor, decimals)}\u2009`);
 }
 
 /** A count with thin spaces between thousands. */

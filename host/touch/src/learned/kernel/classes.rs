@@ -6,7 +6,7 @@ const MOST: usize = 6;
 const FEWEST_PRESSES: usize = 50;
 /// Of the presses taught, so many are within what is usual.
 const USUAL: f64 = 0.99;
-/// What is new is beyond the usual by this factor. Measured on public skins: single presses are flagged in 0 - 2 % then.
+/// What is new is beyond the usual by this factor. Measured on public sensors: single presses are flagged in 0 - 2 % then.
 const BEYOND: f64 = 1.2;
 
 /// Classes of presses of as many each.

@@ -15,7 +15,7 @@ use tactomo_physics::algebra::Cholesky;
 
 use super::points::{Likeness, Points};
 
-/// Numbers of coordinates that are tried: on five public skins of 192 channels, each of these was the best of one.
+/// Numbers of coordinates that are tried: on five public sensors of 192 channels, each of these was the best of one.
 const COMPONENTS: [usize; 5] = [12, 24, 48, 96, usize::MAX];
 /// Widths that are tried, in medians of the distance between points.
 const WIDTHS: [f64; 6] = [0.15, 0.3, 0.6, 1.2, 2.4, 4.8];

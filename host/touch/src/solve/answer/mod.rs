@@ -92,7 +92,7 @@ impl Flags {
 pub struct Calibrated {
     /// As it is now (m).
     pub now_m: f64,
-    /// On a detector that is known exactly (m).
+    /// After a calibration by rubbing (m).
     pub calibrated_m: f64,
 }
 

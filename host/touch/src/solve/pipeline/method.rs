@@ -240,7 +240,7 @@ const TABLE: [Row; 14] = [
     Row {
         method: Method::Kernel,
         name: "kernel",
-        explanation: "for skins without a model: one contact, learned from presses at known places, or from simulated ones",
+        explanation: "for sensors without a model: one contact, learned from presses at known places, or from simulated ones",
         family: Family::Learned,
         parameter: None,
         build: |problem, _| Ok(Box::new(KernelSolver::new(problem)?)),

@@ -12,13 +12,13 @@ const TWO: Format = PLAIN.digits(2);
 /// Charts of time against error, and every figure of every scene.
 pub fn view(report: &Report) -> View {
     let lead = "Each mark is a solver: further **left is faster**, further **down is more accurate**. Marks are medians over frames, and bars reach from the \
-                10th to the 90th percentile. What is cut out of a mark is the share of **wrong answers**. The dashed line joins the solvers that no other \
+                10th to the 90th percentile. The missing slice of a mark is the share of **wrong answers**. The dashed line joins the solvers that no other \
                 beats in both; what is behind it is paler. Small dots are the same solver with another value of its main parameter.";
     let mut view = View::new("Time against error", lead);
     view.method = format!(
         "Error: mean distance of contacts found from those that are there, where one missed or invented (none within the mean distance of \
-         electrodes) counts that distance: OSPA of order 1. An answer is wrong with a contact missed or invented, or if it was refused; an image, if it \
-         explains less than half of the truth's variance. The dotted line across is the median of normal errors with the covariance of the Cramer-Rao \
+         electrodes) counts that distance: OSPA of order 1. An answer is wrong with a contact missed, invented or off by more than 15 % of that distance, if it is \
+         of another kind than what touches, or was refused; an image, if it explains less than half of the truth's variance. The dotted line across is the median of normal errors with the covariance of the Cramer-Rao \
          bound, over the same frames: the converter's noise alone, the number of contacts known, radii known to a factor of two; for frames that follow, \
          from all frames until then. Correlation: of the image with the true conductance, both smoothed by a \
          thirtieth of the shorter side; of a solver without an image, its contacts are drawn as one. Readings come from a finer model than any that is \

@@ -1,6 +1,7 @@
 //! `core`: the contacts that a board finds by itself, from a table that the detector was compiled to.
 
 mod between;
+mod file;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -12,6 +13,7 @@ use tactomo_touch_core::{
     Answer, Contact, Flags as CoreFlags, Frame, FrameError, Says as CoreSays, Solver as Core, Table,
 };
 
+pub use self::file::{CompiledTable, TableFileError};
 pub use self::table::{CompileError, compile};
 use crate::solve::answer::{Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
 use crate::solve::fit::policy;

@@ -410,7 +410,8 @@ impl ContactFinder {
             let of = |k: usize| place_uncertainty(fit, k, &of_place(covariance, k));
             (0..fit.contacts.len()).map(of).map(|place| place.x_m.max(place.y_m)).fold(0.0, f64::max)
         };
-        let [now_m, calibrated_m] = [&fit.covariance()?, &known].map(largest_m);
+        let [now_m, exact_m] = [&fit.covariance()?, &known].map(largest_m);
+        let calibrated_m = exact_m.hypot(policy::calibrated_share() * self.spacing_m);
         (is_off && now_m > policy::calibration_worth() * calibrated_m).then_some(Calibrated { now_m, calibrated_m })
     }
 

@@ -195,6 +195,27 @@ fn as_long_as_nothing_is_known_of_its_errors_a_detector_as_built_invents_little_
 }
 
 #[test]
+fn a_calibration_is_asked_for_where_places_would_be_known_twice_as_well_after_a_rub() {
+    let described = Detector::preset(Detector::DEFAULT).unwrap();
+    let problem = Problem::of(&described).unwrap();
+    let mut solver = Contacts::new(&problem, ContactSettings::of(&problem)).unwrap();
+    let built = drawn(&described, 2);
+    let model = Slab::with_resolution(&built, Resolution::FINE).unwrap();
+    let mut is_asked = |truth: &[Contact]| {
+        solver.reset();
+        let exact = readings_v(&model.impedance_ohm(truth).unwrap(), &built);
+        let solution = solver.solve(&measured(&exact, &described.adc, &mut Noise::new(5))).unwrap();
+        if let Some(calibrated) = solution.calibrated {
+            // A hundredth of the distance of electrodes, 15 mm, is what a rub leaves.
+            assert!(calibrated.calibrated_m >= 1.5e-4 && calibrated.now_m > 2.0 * calibrated.calibrated_m);
+        }
+        solution.flags.calibrate
+    };
+    assert!(!is_asked(&[contact(0.004, 0.003, 1.0)]), "known well enough as it is");
+    assert!(is_asked(&[contact(-0.027, 0.027, 3.0)]), "in a corner");
+}
+
+#[test]
 fn leakage_since_the_baseline_is_no_further_contact_and_goes_again() {
     let described = Detector::preset(Detector::DEFAULT).unwrap();
     let problem = Problem::of(&described).unwrap();

@@ -1,4 +1,4 @@
-//! Presses on six kinds of made-up skins: `cargo run --release --package tactomo-lab --example skins -- FOLDER [SEED [TAUGHT [UNSEEN]]]`.
+//! Presses on six kinds of made-up sensors: `cargo run --release --package tactomo-lab --example sensors -- FOLDER [SEED [TAUGHT [UNSEEN]]]`.
 //!
 //! Writes `KIND-SEED-taught.npz` and `KIND-SEED-unseen.npz` for each kind, presses of one run mixed, as `tactomo-lab learn` reads them. They differ in their
 //! pattern of drive and read, in the law of their force, in sensitivities, noise and drift. None of them is a detector of this program, nor is
@@ -33,13 +33,13 @@ struct Press {
     force_n: f64,
 }
 
-/// A kind of skin: what it reads of a press at a time from 0 to 1, with its noise.
+/// A kind of sensor: what it reads of a press at a time from 0 to 1, with its noise.
 struct Kind {
     name: &'static str,
-    make: fn(&mut Noise) -> Skin,
+    make: fn(&mut Noise) -> Sensor,
 }
 
-type Skin = Box<dyn FnMut(&Press, f64, &mut Noise) -> Vec<f64>>;
+type Sensor = Box<dyn FnMut(&Press, f64, &mut Noise) -> Vec<f64>>;
 
 const KINDS: [Kind; 6] = [
     Kind { name: "opposite", make: opposite },
@@ -59,12 +59,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     for kind in &KINDS {
         let mut noise = Noise::new(seed);
         let mut random = fastrand::Rng::with_seed(seed ^ 0x5eed);
-        let mut skin = (kind.make)(&mut noise);
+        let mut sensor = (kind.make)(&mut noise);
         let count = taught + unseen;
         let presses: Vec<Press> = (0..count).map(|_| press(&mut random, kind.name)).collect();
         let time = |index: usize| index as f64 / count as f64;
         let readings: Vec<Vec<f64>> =
-            presses.iter().enumerate().map(|(index, press)| skin(press, time(index), &mut noise)).collect();
+            presses.iter().enumerate().map(|(index, press)| sensor(press, time(index), &mut noise)).collect();
         let mut order: Vec<usize> = (0..count).collect();
         random.shuffle(&mut order);
         for (name, part) in [("taught", &order[..taught]), ("unseen", &order[taught..])] {
@@ -148,7 +148,7 @@ fn inclusion(at_m: Point, radius_m: f64, pairs: &[[[usize; 2]; 2]]) -> Vec<f64> 
 }
 
 /// Opposite drive, neighbours read: 192 channels. Firmer presses are wider (Hertz), and saturate; 1 mV of noise.
-fn opposite(_: &mut Noise) -> Skin {
+fn opposite(_: &mut Noise) -> Sensor {
     let pairs = pairs(8);
     Box::new(move |press, _, noise| {
         let radius_m = 0.003 * press.force_n.cbrt();
@@ -158,7 +158,7 @@ fn opposite(_: &mut Noise) -> Skin {
 }
 
 /// Neighbours drive, neighbours read: 208 channels, far less sensitive in the middle. Gains differ by 10 %, noise has a share of each reading.
-fn adjacent(noise: &mut Noise) -> Skin {
+fn adjacent(noise: &mut Noise) -> Sensor {
     let pairs = pairs(1);
     let gains: Vec<f64> = pairs.iter().map(|_| 1.0 + 0.1 * noise.normal()).collect();
     Box::new(move |press, _, noise| {
@@ -172,7 +172,7 @@ fn adjacent(noise: &mut Noise) -> Skin {
 }
 
 /// One electrode grounded, twelve read: 192 channels, whose currents saturate as a contact conducts better; read to 12 bits with 1.5 steps of noise.
-fn grounded(_: &mut Noise) -> Skin {
+fn grounded(_: &mut Noise) -> Sensor {
     let potential = |a: Point, b: Point| -(((a[0] - b[0]).hypot(a[1] - b[1])).max(0.001) / RADIUS_M).ln() / PI;
     Box::new(move |press, _, noise| {
         let at_m = press.at_m;
@@ -194,7 +194,7 @@ fn grounded(_: &mut Noise) -> Skin {
 }
 
 /// A grid of 16 x 12 cells that feel pressure, with sensitivities and exponents of their own, five of them dead.
-fn cells(noise: &mut Noise) -> Skin {
+fn cells(noise: &mut Noise) -> Sensor {
     let sensitivities: Vec<f64> =
         (0..192).map(|cell| if cell % 40 == 7 { 0.0 } else { (0.3 * noise.normal()).exp() }).collect();
     let exponents: Vec<f64> = (0..192).map(|_| 0.8 + 0.1 * noise.normal()).collect();
@@ -213,7 +213,7 @@ fn cells(noise: &mut Noise) -> Skin {
 }
 
 /// As `cells`, each with an amplifier of its own, of a factor from 1 to 1000, and all noise before it; pressed steadily.
-fn amplified(noise: &mut Noise) -> Skin {
+fn amplified(noise: &mut Noise) -> Sensor {
     let mut cells = cells(noise);
     let factor = |cell: usize| 1000f64.powf((0.618_034 * cell as f64).fract());
     Box::new(move |press, time, noise| {
@@ -222,7 +222,7 @@ fn amplified(noise: &mut Noise) -> Skin {
 }
 
 /// As `opposite` on a dome that conducts unevenly, whose channels drift, whose force creeps and whose places are known to 0.3 mm.
-fn dome(noise: &mut Noise) -> Skin {
+fn dome(noise: &mut Noise) -> Sensor {
     let pairs = pairs(8);
     let bends: Vec<[f64; 3]> = (0..6).map(|_| [(); 3].map(|()| noise.normal())).collect();
     let drifts: Vec<f64> = pairs.iter().map(|_| 4e-3 * noise.normal()).collect();
