@@ -1,7 +1,8 @@
 //! Columns of numbers in text.
 //!
-//! Cells are separated by commas, semicolons, tabs or blanks, whichever the first line has. A first line without any number names the
-//! columns. Empty lines, and lines that begin with `#`, are left out.
+//! Cells are separated by commas, semicolons, tabs or blanks, whichever makes numbers of the first lines; but for commas, decimals may have
+//! commas too. A first line without any number names the columns. Empty lines, lines that begin with `#`, a line `sep=;` as Excel writes it, and a
+//! separator at the end of every line are left out.
 
 use std::io::{self, Write};
 
@@ -9,25 +10,46 @@ use ::csv::{ErrorKind, ReaderBuilder, StringRecord, Trim};
 
 use super::Array;
 
-/// Names of the columns, if there are any, and the rows.
+/// Separators, in the order in which they are tried: where commas are decimal points, lines have both.
+const MARKS: [u8; 4] = [b';', b'\t', b',', b' '];
+
+/// What is in a text.
+#[derive(Debug, PartialEq)]
+pub struct Text {
+    /// Names of the columns, or none.
+    pub names: Vec<String>,
+    /// The rows; those that are no row of numbers are not numbers throughout.
+    pub rows: Array,
+    /// What is wrong with the first of those, with its line and column.
+    pub wrong: Option<String>,
+}
+
+/// Reads a text of which some rows may be wrong, but fewer than are right.
 ///
 /// # Errors
 /// The line and the column that are wrong.
-pub fn parse(text: &str) -> Result<(Vec<String>, Array), String> {
+pub fn parse(text: &str) -> Result<Text, String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let separator = separator(text);
+    let mark = declared(text).unwrap_or_else(|| separator(text));
+    let is_trailing = ends_with_separators(text, mark);
     let mut reader = ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .trim(Trim::All)
         .comment(Some(b'#'))
-        .delimiter(separator)
+        .delimiter(mark)
         .from_reader(text.as_bytes());
-    let mut rows = Rows::default();
+    let mut rows = Rows { has_decimal_commas: mark != b',', ..Rows::default() };
     for record in reader.records() {
         let record = record.map_err(|error| error.to_string())?;
         let line = record.position().map_or(0, |position| line_at(text, position));
-        let cells = cells(&record, separator);
+        if line == 1 && declared(text).is_some() {
+            continue;
+        }
+        let mut cells = cells(&record, mark);
+        if is_trailing && cells.len() > 1 && cells.last() == Some(&"") {
+            cells.pop();
+        }
         match cells[..] {
             [] | [""] => {}
             [first, ..] if first.starts_with('#') => {}
@@ -44,12 +66,41 @@ fn line_at(text: &str, position: &::csv::Position) -> u64 {
     position.line() + skipped as u64
 }
 
-/// The separator of the first line that is neither empty nor a comment.
+/// The separator that a first line declares, as Excel has it.
+fn declared(text: &str) -> Option<u8> {
+    let first = text.lines().next()?.trim_matches('"');
+    match first.strip_prefix("sep=")?.as_bytes() {
+        [mark] => Some(*mark),
+        _ => None,
+    }
+}
+
+/// Lines that are neither empty nor comments, nor declare the separator.
+fn lines(text: &str) -> impl Iterator<Item = &str> {
+    let lines = text.lines().skip(usize::from(declared(text).is_some()));
+    lines.filter(|line| !line.trim().is_empty() && !line.starts_with('#'))
+}
+
+/// The separator that makes several numbers of one of the first two lines, of which one may name the columns; else one that the first has.
 fn separator(text: &str) -> u8 {
-    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
-    let first = lines.next().unwrap_or_default();
-    // Semicolons first: where commas are decimal points, the cells have both.
-    [b';', b',', b'\t'].into_iter().find(|mark| first.as_bytes().contains(mark)).unwrap_or(b' ')
+    let is_parted = |mark: u8, line: &str| {
+        let cells: Vec<&str> = line.split(char::from(mark)).map(str::trim).collect();
+        let cells = cells.strip_suffix(&[""]).unwrap_or(&cells);
+        let cells = cells.iter().filter(|cell| mark != b' ' || !cell.is_empty());
+        let are_numbers = cells.clone().all(|cell| number(cell.trim_matches('"'), mark != b',').is_some());
+        are_numbers && cells.count() > 1
+    };
+    let first = lines(text).next().unwrap_or_default();
+    let parted = MARKS.into_iter().find(|mark| lines(text).take(2).any(|line| is_parted(*mark, line)));
+    let has = || [b';', b',', b'\t'].into_iter().find(|mark| first.as_bytes().contains(mark));
+    parted.or_else(has).unwrap_or(b' ')
+}
+
+/// Whether lines end with a separator, behind which is no cell: all but two at most, one of names and one that is cut.
+fn ends_with_separators(text: &str, mark: u8) -> bool {
+    let ends = |line: &str| line.trim_end_matches(' ').as_bytes().last() == Some(&mark);
+    let (all, short) = lines(text).fold((0, 0), |(all, short), line| (all + 1, short + usize::from(!ends(line))));
+    mark != b' ' && short <= 2 && all > 2 * short
 }
 
 /// The cells of a line. Between two marks there must be a cell, so that one that is missing is seen; blanks may be many.
@@ -57,70 +108,98 @@ fn cells(record: &StringRecord, separator: u8) -> Vec<&str> {
     record.iter().filter(|cell| separator != b' ' || !cell.is_empty()).collect()
 }
 
+/// The number in a cell, whose decimals may have a comma.
+fn number(cell: &str, has_decimal_commas: bool) -> Option<f64> {
+    let with_point = || cell.replacen(',', ".", 1).parse().ok();
+    cell.parse().ok().or_else(|| if has_decimal_commas && !cell.contains('.') { with_point() } else { None })
+}
+
 /// What has been read.
 #[derive(Default)]
 struct Rows {
+    has_decimal_commas: bool,
     names: Vec<String>,
     columns: usize,
     count: usize,
     values: Vec<f64>,
+    /// Rows that are wrong, and what is with the first of them.
+    wrong: (usize, Option<String>),
+    /// The first cells whose decimals have a point, and a comma.
+    decimals: [Option<String>; 2],
 }
 
 impl Rows {
     fn add(&mut self, line: u64, cells: &[&str]) -> Result<(), String> {
         if self.columns == 0 {
             self.columns = cells.len();
-            if is_header(line, cells)? {
+            if self.is_header(line, cells)? {
                 self.names = cells.iter().map(|&cell| cell.to_owned()).collect();
                 return Ok(());
             }
         }
-        for (column, cell) in cells.iter().enumerate() {
-            let number = cell.parse().map_err(|_| {
-                format!("line {line}, column {}: `{}` is not a number{}", column + 1, shortened(cell), hint(cell))
-            })?;
-            self.values.push(number);
-        }
-        if cells.len() != self.columns {
-            return Err(format!("line {line}: {} numbers, but {} columns before it", cells.len(), self.columns));
+        let before = self.values.len();
+        if let Err(what) = self.add_numbers(line, cells) {
+            self.values.truncate(before);
+            self.values.resize(before + self.columns, f64::NAN);
+            self.wrong.0 += 1;
+            self.wrong.1.get_or_insert(what);
         }
         self.count += 1;
         Ok(())
     }
 
-    fn finish(self) -> Result<(Vec<String>, Array), String> {
+    fn add_numbers(&mut self, line: u64, cells: &[&str]) -> Result<(), String> {
+        for (column, cell) in cells.iter().enumerate() {
+            let number = number(cell, self.has_decimal_commas)
+                .ok_or_else(|| format!("line {line}, column {}: `{}` is not a number", column + 1, shortened(cell)))?;
+            for (decimals, mark) in self.decimals.iter_mut().zip(['.', ',']) {
+                if decimals.is_none() && cell.contains(mark) {
+                    *decimals = Some(format!("{} in line {line}", shortened(cell)));
+                }
+            }
+            self.values.push(number);
+        }
+        if cells.len() != self.columns {
+            return Err(format!("line {line}: {} numbers, but {} columns before it", cells.len(), self.columns));
+        }
+        Ok(())
+    }
+
+    /// Whether the first line names the columns: no cell of it is a number, nor begins as one does. A line of both is one of
+    /// numbers with a mistake in it, or a header that would swallow a frame without a word.
+    fn is_header(&self, line: u64, cells: &[&str]) -> Result<bool, String> {
+        let is_number = |cell: &&str| number(cell, self.has_decimal_commas).is_some();
+        let is_name =
+            |cell: &&str| !is_number(cell) && !cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+        if cells.iter().all(is_number) {
+            return Ok(false);
+        }
+        if cells.iter().all(is_name) {
+            return Ok(true);
+        }
+        let wrong = cells.iter().position(|cell| !is_number(cell)).unwrap_or_default();
+        Err(format!(
+            "line {line}, column {}: `{}` is not a number; to name the columns, the first line must hold names only",
+            wrong + 1,
+            shortened(cells[wrong])
+        ))
+    }
+
+    fn finish(self) -> Result<Text, String> {
         if self.count == 0 {
             return Err("there are no numbers".to_owned());
         }
-        Ok((self.names, Array { shape: vec![self.count, self.columns], values: self.values }))
+        if let [Some(point), Some(comma)] = &self.decimals {
+            return Err(format!(
+                "decimals have points ({point}) and commas ({comma}): write them in one way, and no separators of thousands"
+            ));
+        }
+        let (wrong, what) = self.wrong;
+        if let Some(what) = what.clone().filter(|_| 2 * wrong > self.count) {
+            return Err(what);
+        }
+        Ok(Text { names: self.names, rows: Array { shape: vec![self.count, self.columns], values: self.values }, wrong: what })
     }
-}
-
-/// Whether the first line names the columns: no cell of it is a number, nor begins as one does. A line of both is one of
-/// numbers with a mistake in it, or a header that would swallow a frame without a word.
-fn is_header(line: u64, cells: &[&str]) -> Result<bool, String> {
-    let is_number = |cell: &&str| cell.parse::<f64>().is_ok();
-    let is_name =
-        |cell: &&str| !is_number(cell) && !cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
-    if cells.iter().all(is_number) {
-        return Ok(false);
-    }
-    if cells.iter().all(is_name) {
-        return Ok(true);
-    }
-    let wrong = cells.iter().position(|cell| !is_number(cell)).unwrap_or_default();
-    Err(format!(
-        "line {line}, column {}: `{}` is not a number{}; to name the columns, the first line must hold names only",
-        wrong + 1,
-        shortened(cells[wrong]),
-        hint(cells[wrong])
-    ))
-}
-
-/// What may have been meant.
-fn hint(cell: &str) -> &'static str {
-    let with_point = cell.replacen(',', ".", 1);
-    if cell.contains(',') && with_point.parse::<f64>().is_ok() { " (decimals need a point)" } else { "" }
 }
 
 /// The beginning of a cell, for messages.
@@ -168,6 +247,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Names and rows of a text that is right throughout.
+    fn parse(text: &str) -> Result<(Vec<String>, Array), String> {
+        let Text { names, rows, wrong } = super::parse(text)?;
+        wrong.map_or(Ok((names, rows)), Err)
+    }
+
     #[test]
     fn names_comments_and_separators_are_understood() {
         let (names, rows) = parse("# made by hand, \"today\n\"x_m\"; force_n\r\n1; 2.5\n\n-3e-3;nan\n").unwrap();
@@ -186,9 +271,38 @@ mod tests {
         assert_eq!(parse("1,2\n3,much").unwrap_err(), "line 2, column 2: `much` is not a number");
         assert_eq!(parse("1,2\n\n3").unwrap_err(), "line 3: 1 numbers, but 2 columns before it");
         assert_eq!(parse("1,2\n3,,4").unwrap_err(), "line 2, column 2: `` is not a number");
-        assert_eq!(parse("1;2\n3;4,5").unwrap_err(), "line 2, column 2: `4,5` is not a number (decimals need a point)");
         assert_eq!(parse("a,b\n").unwrap_err(), "there are no numbers");
         assert_eq!(parse("").unwrap_err(), "there are no numbers");
+    }
+
+    #[test]
+    fn dialects_of_other_programs_are_read() {
+        for text in [
+            "0,5\t1,25\n-2e-3\t3\n",
+            "0,5 1,25\n-2e-3 3\n",
+            "0,5;1,25\r\n-2e-3;3\r\n",
+            "sep=;\n0.5;1.25\n-2e-3;3\n",
+            "\"sep=;\"\na;b\n0,5;1,25\n-2e-3;3\n",
+            "sep=\t\n0,5\t1,25\n-2e-3\t3\n",
+            "0.5,1.25,\n-2e-3,3,\n",
+            "a,b\n0.5,1.25,\n-2e-3,3,\n",
+            "0,5;1,25;\n-2e-3;3;\n",
+            "\"0,5\";\"1,25\"\n-2e-3;3\n",
+        ] {
+            assert_eq!(parse(text).map(|(_, rows)| rows.values), Ok(vec![0.5, 1.25, -2e-3, 3.0]), "{text:?}");
+        }
+        let both = parse("0.5;1,234\n1;2\n").unwrap_err();
+        assert!(both.contains("points (0.5 in line 1) and commas (1,234 in line 1)"), "{both}");
+    }
+
+    #[test]
+    fn rows_that_are_no_numbers_and_a_cut_last_line_are_no_numbers_where_others_are_right() {
+        let text = super::parse("a,b\n1,2\n3,ERROR\n5,6\n7,8\n9").unwrap();
+        assert_eq!(text.rows.shape, [5, 2]);
+        let is_wrong: Vec<bool> = text.rows.values.chunks(2).map(|row| row.iter().all(|value| value.is_nan())).collect();
+        assert_eq!(is_wrong, [false, true, false, false, true]);
+        assert_eq!(text.wrong.as_deref(), Some("line 3, column 2: `ERROR` is not a number"));
+        assert!(super::parse("1,2\nx,y\n3,z\n").is_err(), "most are wrong");
     }
 
     #[test]
@@ -239,7 +353,7 @@ mod tests {
 
         #[test]
         fn any_text_is_read_without_panic(text in "\\PC*|[0-9,;.e\n\"# -]*") {
-            if let Ok((names, rows)) = parse(&text) {
+            if let Ok(Text { names, rows, .. }) = super::parse(&text) {
                 prop_assert_eq!(rows.values.len(), rows.shape[0] * rows.shape[1]);
                 prop_assert!(names.is_empty() || names.len() == rows.shape[1]);
             }

@@ -2,14 +2,17 @@
 //!
 //! [`mod@file`] bounds what is read of any file that is read whole.
 
+mod channels;
 mod csv;
 pub mod file;
+mod kinds;
 mod npy;
 mod npz;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use self::channels::{Channels, channels};
 pub use self::csv::CsvWriter;
 use self::file::Format;
 pub use self::npy::Values;
@@ -78,9 +81,15 @@ impl Table {
     /// # Errors
     /// [`TableError`], which says where the file is wrong.
     pub fn read(path: &Path) -> Result<Self, TableError> {
-        let read = |source| TableError::Read { path: path.to_owned(), source };
-        let bytes = FORMAT.read(path).map_err(read)?;
-        Self::parse(&bytes).map_err(|what| TableError::Format { path: path.to_owned(), what })
+        Self::parse(&bytes_of(path)?).map_err(|what| TableError::Format { path: path.to_owned(), what })
+    }
+
+    /// Reads a file of which some rows may be wrong, but fewer than are right, as those of a log are: see [`parse_log`](Self::parse_log).
+    ///
+    /// # Errors
+    /// [`TableError`], which says where the file is wrong.
+    pub fn read_log(path: &Path) -> Result<(Self, Option<String>), TableError> {
+        Self::parse_log(&bytes_of(path)?).map_err(|what| TableError::Format { path: path.to_owned(), what })
     }
 
     /// Reads the bytes of a file.
@@ -88,24 +97,38 @@ impl Table {
     /// # Errors
     /// What is wrong and where.
     pub fn parse(bytes: &[u8]) -> Result<Self, String> {
-        if npz::is_npz(bytes) {
-            return npz::parse(bytes).map(Self::Arrays);
+        match Self::parse_log(bytes)? {
+            (_, Some(wrong)) => Err(wrong),
+            (table, None) => Ok(table),
         }
-        if npy::is_npy(bytes) {
-            return Ok(Self::Arrays(vec![("array".to_owned(), npy::parse(bytes)?)]));
-        }
-        let text = str::from_utf8(bytes).map_err(|_| "this is neither text nor NPY nor NPZ".to_owned())?;
-        let (names, rows) = csv::parse(text)?;
-        Ok(Self::Columns { names, rows })
     }
 
-    /// The array of a name, or the lone one.
+    /// Reads the bytes of a file of which some rows may be wrong, but fewer than are right: those are not numbers throughout, and what is wrong with
+    /// the first of them is told.
+    ///
+    /// # Errors
+    /// What is wrong and where.
+    pub fn parse_log(bytes: &[u8]) -> Result<(Self, Option<String>), String> {
+        if npz::is_npz(bytes) {
+            return Ok((Self::Arrays(npz::parse(bytes)?), None));
+        }
+        if npy::is_npy(bytes) {
+            return Ok((Self::Arrays(vec![("array".to_owned(), npy::parse(bytes)?)]), None));
+        }
+        let csv::Text { names, rows, wrong } = csv::parse(&kinds::text_of(bytes)?)?;
+        Ok((Self::Columns { names, rows }, wrong))
+    }
+
+    /// The array of a name, or the lone one; of columns with names those that are [channels].
     ///
     /// # Errors
     /// The names that there are.
     pub fn array(self, wanted: &[&str]) -> Result<Array, String> {
         let mut arrays = match self {
-            Self::Columns { rows, .. } => return Ok(rows),
+            Self::Columns { names, rows } => {
+                let channels = channels(&names).which;
+                return Ok(if names.is_empty() { rows } else { rows.of_columns(&channels) });
+            }
             Self::Arrays(arrays) => arrays,
         };
         if let Some(index) = arrays.iter().position(|(name, _)| wanted.contains(&name.as_str())) {
@@ -116,6 +139,11 @@ impl Table {
             _ => Err(format!("no array is called {}; there are {}", wanted.join(" or "), names(&arrays))),
         }
     }
+}
+
+/// All bytes of a file that is not too long.
+fn bytes_of(path: &Path) -> Result<Vec<u8>, TableError> {
+    FORMAT.read(path).map_err(|source| TableError::Read { path: path.to_owned(), source })
 }
 
 /// Names of arrays, for messages.
@@ -138,6 +166,16 @@ impl Array {
     /// Numbers in each row.
     pub fn columns(&self) -> usize {
         self.shape.iter().skip(1).product()
+    }
+
+    /// Some of the columns, in this order.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn of_columns(&self, columns: &[usize]) -> Self {
+        let rows = self.values.chunks_exact(self.columns().max(1));
+        let values = rows.flat_map(|row| columns.iter().map(|&column| row[column])).collect();
+        Self { shape: vec![self.rows(), columns.len()], values }
     }
 
     /// Shape for messages: `3 x 256`.
@@ -165,7 +203,7 @@ mod tests {
     fn a_missing_file_and_other_bytes_are_refused() {
         let missing = Table::read(Path::new("no/such.csv")).unwrap_err();
         assert_eq!(missing.to_string(), "cannot read no/such.csv");
-        assert!(Table::parse(&[0xff, 0xfe, 0]).unwrap_err().contains("neither text nor NPY"));
+        assert!(Table::parse(&[0xff, 0x00, 0x07]).unwrap_err().contains("neither text nor NPY"));
     }
 
     proptest! {

@@ -6,7 +6,7 @@ use zip::write::{SimpleFileOptions, ZipWriter};
 use zip::{CompressionMethod, ZipArchive};
 
 use super::npy::Values;
-use super::{Array, LONGEST, npy};
+use super::{Array, LONGEST, kinds, npy};
 
 /// Most arrays in an archive.
 const MOST_ARRAYS: usize = 1000;
@@ -22,6 +22,9 @@ pub fn is_npz(bytes: &[u8]) -> bool {
 /// What is wrong, and in which array.
 pub fn parse(bytes: &[u8]) -> Result<Vec<(String, Array)>, String> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| format!("not an NPZ file: {error}"))?;
+    if let Some(other) = kinds::archive(archive.file_names()) {
+        return Err(other);
+    }
     if archive.len() > MOST_ARRAYS {
         return Err(format!("{} arrays, but {MOST_ARRAYS} at most are read", archive.len()));
     }
@@ -106,9 +109,9 @@ mod tests {
         assert!(parse(b"PK\x03\x04 and no more").unwrap_err().contains("not an NPZ file"));
         let mut bytes = Vec::new();
         let mut zip = ZipWriter::new(Cursor::new(&mut bytes));
-        zip.start_file("letter.txt", SimpleFileOptions::default()).unwrap();
+        zip.start_file("letter.npy", SimpleFileOptions::default()).unwrap();
         zip.write_all(b"hello").unwrap();
         zip.finish().unwrap();
-        assert_eq!(parse(&bytes).unwrap_err(), "array letter.txt: the header of the array is cut off");
+        assert_eq!(parse(&bytes).unwrap_err(), "array letter: the header of the array is cut off");
     }
 }

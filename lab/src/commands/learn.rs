@@ -17,10 +17,11 @@ use tactomo_cli::output::{self, NewFile, message};
 /// PRESSES is CSV with named columns: `x_m`, `y_m`, perhaps `z_m`, and perhaps `force_n`, `depth_m` or
 /// `conductance_s`, the first of which is learned too. All other columns are channels (V, less
 /// those at rest), but for those that count or tell the time (such as `id`, `press_id`, `frame`,
-/// `time_s`) and those in a unit that no reading has (such as `..._mm`, `..._n`, `..._deg`). Or NPZ, with arrays of these names, a number a
-/// press, and `readings_v`, a row a press. Some hundreds of presses are good.
+/// `time_s`), those in a unit that no reading has (such as `..._mm`, `..._n`, `..._deg`), and forces and poses (`Fz`, `roll`). Or NPZ, with arrays of
+/// these names, a number a press, and `readings_v`, a row a press. Some hundreds of presses are good.
 ///
-/// What is learned is told with its error on presses that are left out one after the other, and
+/// Rows at one place, or with one number in a column `press`, are of one press. What is learned is told with its error on presses that are left out whole, one
+/// after the other, and
 /// with that of guessing the middle of all presses each time; where it is no better, it says so.
 ///
 /// Examples:
@@ -38,7 +39,7 @@ pub struct Args {
     /// The detector, if the channels are its readings, row by row: then the force is taken out of them before places are learned
     #[arg(long, value_name = "NAME|FILE")]
     detector: Option<Chosen>,
-    /// Prints `{presses, channels, description, components, left_out_m, middle_m, no_better_than_middle, strength, left_out_strength_share, seconds, out}` as JSON
+    /// Prints `{presses, rows, channels, description, components, left_out_m, middle_m, no_better_than_middle, strength, left_out_strength_share, seconds, out}` as JSON
     #[arg(long)]
     json: bool,
 }
@@ -46,6 +47,7 @@ pub struct Args {
 #[derive(Serialize)]
 struct Report {
     presses: usize,
+    rows: usize,
     channels: usize,
     description: &'static str,
     components: usize,
@@ -68,11 +70,16 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let (kernel, taken) = timed(|| Kernel::train(&presses));
     let (kernel, seconds) = (kernel.with_context(|| args.presses.display().to_string())?, taken.as_secs_f64());
     out.write(Learned::bytes_of(&kernel)?)?;
+    if !presses.others.is_empty() {
+        let others: Vec<_> = presses.others.iter().map(|name| name.escape_debug().to_string()).collect();
+        message!("columns that are taken for no channels: {}", others.join(", "));
+    }
     message!("{}", kernel.sentence());
     message!("{} written, after {seconds:.1} s of processor time", args.out.display());
     if args.json {
         output::print(&serde_json::to_string(&Report {
             presses: kernel.presses(),
+            rows: kernel.rows(),
             channels: kernel.channels(),
             description: kernel.description().name(),
             components: kernel.components(),

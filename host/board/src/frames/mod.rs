@@ -4,6 +4,7 @@ mod recorded;
 mod survey;
 
 use std::borrow::Cow;
+use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -33,6 +34,25 @@ pub enum FrameFile {
 pub struct Rows {
     rows: std::vec::IntoIter<f64>,
     channels: usize,
+    /// Frames that were read, those that are left out included.
+    read: u64,
+    left_out: LeftOut,
+}
+
+/// Rows of a table that were left out, because they are no numbers.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LeftOut {
+    /// How many.
+    pub count: u64,
+    /// What is wrong with the first of them.
+    pub first: Option<String>,
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let rows = if self.count == 1 { "row is" } else { "rows are" };
+        write!(f, "{} {rows} left out: {}", self.count, self.first.as_deref().unwrap_or("no numbers"))
+    }
 }
 
 /// One frame.
@@ -185,8 +205,17 @@ impl FrameFile {
             return Ok(Self::Recording(Box::new(Recorded::open(path)?)));
         }
         let shape = |what| FramesError::Shape { path: path.to_owned(), what };
-        let array = readings(Table::read(path)?).map_err(shape)?;
-        Rows::of(array, expected).map(Self::Table).map_err(shape)
+        let (table, wrong) = Table::read_log(path)?;
+        let rows = readings(table).and_then(|array| Rows::of(array, expected)).map_err(shape)?;
+        Ok(Self::Table(Rows { left_out: LeftOut { count: 0, first: wrong }, ..rows }))
+    }
+
+    /// Rows of a table that were left out so far.
+    pub fn left_out(&self) -> Option<&LeftOut> {
+        match self {
+            Self::Recording(_) => None,
+            Self::Table(rows) => Some(&rows.left_out).filter(|left_out| left_out.count > 0),
+        }
     }
 
     /// The board that a recording was taken from.
@@ -263,23 +292,64 @@ impl Rows {
                 array.shape_text()
             ));
         }
-        Ok(Self { rows: array.values.into_iter(), channels })
+        Ok(Self { rows: array.values.into_iter(), channels, read: 0, left_out: LeftOut::default() })
     }
 
+    /// The next frame of numbers alone.
     fn next_frame(&mut self) -> Option<FileFrame> {
-        let volts: Vec<f64> = self.rows.by_ref().take(self.channels).collect();
-        (volts.len() == self.channels).then_some(FileFrame {
-            time_s: None,
-            delay: None,
-            arrived_s: None,
-            sequence: None,
-            lost_before: 0,
-            measured_v: volts.clone(),
-            volts,
-            says: Vec::new(),
-            found: None,
-        })
+        let mut lost_before = 0;
+        loop {
+            let volts: Vec<f64> = self.rows.by_ref().take(self.channels).collect();
+            if volts.len() < self.channels {
+                return None;
+            }
+            self.read += 1;
+            if let Some(channel) = volts.iter().position(|volts| !volts.is_finite()) {
+                let place = || format!("row {}, column {} is not a finite number", self.read, channel + 1);
+                self.left_out.first.get_or_insert_with(place);
+                (self.left_out.count, lost_before) = (self.left_out.count + 1, lost_before + 1);
+                continue;
+            }
+            return Some(FileFrame {
+                time_s: None,
+                delay: None,
+                arrived_s: None,
+                sequence: None,
+                lost_before,
+                measured_v: volts.clone(),
+                volts,
+                says: Vec::new(),
+                found: None,
+            });
+        }
     }
+}
+
+/// What a table with so many columns most likely is, where frames of `electrodes` squared are needed.
+pub fn likely(columns: usize, electrodes: usize) -> Option<String> {
+    let n = electrodes;
+    let all = n * n;
+    Some(match columns {
+        _ if columns == all - n => format!("{n} x {} are all but the grounded electrode's own readings: put a 0 there in each row of {n}", n - 1),
+        _ if n > 3 && (columns == n * (n - 3) || columns == n * (n - 3) / 2) => format!(
+            "{columns} are what EIT with adjacent drive measures ({n} x {}), not one grounded electrode at a time: `tactomo-lab learn` takes any channels",
+            n - 3
+        ),
+        _ if columns == all / 2 - n / 2 || columns == all / 2 + n / 2 => {
+            "this is one reading of each pair of electrodes, but the two differ: both are needed".to_owned()
+        }
+        _ if columns == 2 * all => {
+            "these are two numbers a reading: real and imaginary parts, decimal commas that were taken for separators, or two frames a row".to_owned()
+        }
+        _ if columns == all + 1 => "one column is no reading, such as a number or a time: leave it out, or name the columns in the first line".to_owned(),
+        _ if columns == n => format!("each row is of one grounded electrode: write the {n} rows of a frame one after the other in a row"),
+        _ if columns > all && columns.is_multiple_of(all) => format!("these are {} frames a row: one is needed", columns / all),
+        _ if columns > all && columns < all + n => {
+            format!("{} columns are no readings: leave them out, or name the columns in the first line", columns - all)
+        }
+        _ if columns > 1 && columns.isqrt().pow(2) == columns => format!("these are of {} electrodes", columns.isqrt()),
+        _ => return None,
+    })
 }
 
 fn is_recording(path: &Path) -> bool {
@@ -308,6 +378,26 @@ mod tests {
         assert_eq!(frames(array(&[4, 4])).map(|frames| frames.len()), Ok(1), "as many as are expected");
         assert_eq!(frames(array(&[3, 3])).map(|frames| frames.len()), Ok(3));
         assert_eq!(frames(array(&[3, 2, 2])).map(|frames| frames[2].clone()), Ok(vec![8.0, 9.0, 10.0, 11.0]));
+    }
+
+    #[test]
+    fn rows_that_are_no_numbers_are_left_out_and_counted() {
+        let values = [1.0, 2.0, f64::NAN, 4.0, 5.0, f64::INFINITY, 7.0, 8.0].to_vec();
+        let mut rows = Rows::of(Array { shape: vec![4, 2], values }, None).unwrap();
+        let frames: Vec<_> = std::iter::from_fn(|| rows.next_frame()).map(|frame| (frame.volts[0], frame.lost_before)).collect();
+        assert_eq!(frames, [(1.0, 0), (7.0, 2)]);
+        assert_eq!(rows.left_out.to_string(), "2 rows are left out: row 2, column 1 is not a finite number");
+    }
+
+    #[test]
+    fn numbers_of_columns_are_told_apart() {
+        for (columns, word) in [
+            (240, "16 x 15"), (208, "EIT"), (104, "EIT"), (120, "pair"), (136, "pair"), (512, "imaginary"), (257, "one column"),
+            (260, "4 columns"), (16, "one grounded"), (768, "3 frames"), (64, "8 electrodes"), (1024, "4 frames"),
+        ] {
+            assert!(likely(columns, 16).is_some_and(|what| what.contains(word)), "{columns}: {:?}", likely(columns, 16));
+        }
+        assert_eq!(likely(250, 16), None);
     }
 
     #[test]

@@ -190,6 +190,25 @@ impl Readings {
         }
     }
 
+    /// Root mean square of those that were read (V), as [`touch_v`](Self::touch_v) has them.
+    pub fn rms_v(&self) -> f64 {
+        self.rms_of(|volts| volts)
+    }
+
+    /// The same of what lies below the baseline (V), which noise alone leaves there.
+    pub fn rms_below_rest_v(&self) -> f64 {
+        self.rms_of(|volts| volts.min(0.0))
+    }
+
+    fn rms_of(&self, part: impl Fn(f64) -> f64) -> f64 {
+        let n = self.electrodes.max(1);
+        let read = (0..self.volts.len()).filter(|i| self.says.get(*i) != Some(&Says::Nothing));
+        let (count, squares) = read.fold((0usize, 0.0), |(count, squares), i| {
+            (count + 1, squares + part(self.touch_v(i / n, i % n)).powi(2))
+        });
+        (squares / count.max(1) as f64).sqrt()
+    }
+
     /// All of them as [`touch_v`](Self::touch_v) has them, row by row (V).
     pub fn touches_v(&self) -> Cow<'_, [f64]> {
         if self.says.is_empty() {

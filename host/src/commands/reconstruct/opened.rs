@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::bail;
-use tactomo::board::frames::FrameFile;
+use tactomo::board::frames::{FrameFile, likely};
 use tactomo::board::{identity, measured};
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
@@ -82,9 +82,10 @@ fn solved(input: &Input, method: Method, learned: Option<Learned>) -> anyhow::Re
     let correction = detector.correction.filter(|_| !input.uncorrected);
     let detector = Detector { force: input.force.clone().or(detector.force), correction, ..detector };
     if file.channels() != electrodes * electrodes {
+        let likely = likely(file.channels(), electrodes).map_or_else(String::new, |what| format!(" ({what})"));
         bail!(
-            "{} has {} readings a frame, but the detector {} with its {electrodes} electrodes needs {}: give the right one with \
-             --detector",
+            "{} has {} readings a frame{likely}, but the detector {} with its {electrodes} electrodes needs {}: give the right one \
+             with --detector",
             input.file.display(),
             file.channels(),
             detector.name,

@@ -139,6 +139,8 @@ mod tests {
             places_m: (0..40).map(|i| [place(i)[0], place(i)[1], 0.0]).collect(),
             strengths: strength.iter().flat_map(|_| (0..40).map(|i| 1.0 + f64::from(i % 3))).collect(),
             strength,
+            of: None,
+            others: Vec::new(),
             drive_v: None,
         };
         Kernel::train(&presses).unwrap()

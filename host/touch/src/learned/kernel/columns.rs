@@ -1,27 +1,18 @@
 //! Columns of a file of presses, or of readings alone: which are places and strengths, which are channels.
 //!
-//! In a file with names, a column is no channel if it
-//! - is one of `x_m`, `y_m`, `z_m`, `force_n`, `depth_m`, `conductance_s`, which a kernel learns;
-//! - counts or tells the time: its name is empty, or is, or ends after a `_` in, `id`, `index`, `number`, `row`, `frame`, `sequence`, `press`,
-//!   `trial`, `time`, `timestamp` or `date`, in any case, also with a unit of time after it (`time_s`, `press_id`); or begins with `Unnamed`, as
-//!   pandas calls an index;
-//! - ends in a unit that no reading has: `_m`, `_mm`, `_um`, `_n`, `_mn`, `_g`, `_kg`, `_pa`, `_kpa`, `_deg`, `_rad`, `_s`, `_ms`, `_us`, `_ns`.
+//! In a file with names, `x_m`, `y_m`, `z_m`, `force_n`, `depth_m` and `conductance_s` are learned, and [`channels`] tells which of the others
+//! are channels.
 //!
-//! All others are channels, in their order. Where the channels are known by their names, they are found by these, and no other column is looked at.
+//! Where the channels are known by their names, they are found by these, and no other column is looked at.
 
-use tactomo_table::{Array, Table};
+use tactomo_table::{Array, Channels, Table, channels};
 
 /// Columns that are learned.
 const LEARNED: [&str; 6] = ["x_m", "y_m", "z_m", "force_n", "depth_m", "conductance_s"];
-/// Words of names that count or tell the time.
-const COUNTS: [&str; 12] =
-    ["", "id", "index", "number", "row", "frame", "sequence", "press", "trial", "time", "timestamp", "date"];
-/// Units of time.
-const TIMES: [&str; 4] = ["s", "ms", "us", "ns"];
-/// Further units that no reading has.
-const UNITS: [&str; 11] = ["m", "mm", "um", "n", "mn", "g", "kg", "pa", "kpa", "deg", "rad"];
 /// Names that an array of readings may have in an NPZ file.
 const READINGS: [&str; 3] = ["readings_v", "readings", "volts"];
+/// Last words of columns that say which press a row is of.
+const PRESS: [&str; 2] = ["press", "trial"];
 /// Names that a message lists.
 const LISTED: usize = 5;
 
@@ -34,9 +25,18 @@ pub struct Columns {
     pub names: Vec<String>,
     /// Readings: `rows x channels`.
     pub readings: Array,
+    /// Names of columns that are neither channels nor learned, where channels were told by their names.
+    pub others: Vec<String>,
+    /// Which press each row is of, if a column says so.
+    pub presses: Option<Vec<f64>>,
 }
 
 impl Columns {
+    /// Readings alone.
+    fn of_readings(readings: Array) -> Self {
+        Self { known: Vec::new(), names: Vec::new(), readings, others: Vec::new(), presses: None }
+    }
+
     /// Those of a table, with channels of these names if there are any.
     ///
     /// # Errors
@@ -49,38 +49,33 @@ impl Columns {
     }
 }
 
-/// Whether a column of such a name is a channel.
-fn is_channel(name: &str) -> bool {
-    let lower = name.trim().to_ascii_lowercase();
-    if LEARNED.contains(&lower.as_str()) || lower.starts_with("unnamed") {
-        return false;
-    }
-    let words: Vec<&str> = lower.split(['_', ' ', '-']).collect();
-    let last = words.last().copied().unwrap_or_default();
-    if words.len() > 1 && (TIMES.contains(&last) || UNITS.contains(&last)) {
-        return false;
-    }
-    let word = last.split(['[', '(']).next().unwrap_or_default();
-    !COUNTS.contains(&word)
-}
-
 fn named(heads: &[String], rows: Array, wanted: &[String]) -> Result<Columns, String> {
     if heads.is_empty() {
-        return Ok(Columns { known: Vec::new(), names: Vec::new(), readings: rows });
+        return Ok(Columns::of_readings(rows));
     }
     if let Some(index) = (1..heads.len()).find(|&index| heads[..index].contains(&heads[index])) {
         return Err(format!("two columns are called {}", heads[index].escape_debug()));
     }
-    let channels = match wanted {
-        [] => (0..heads.len()).filter(|&index| is_channel(&heads[index])).collect(),
-        _ => by_name(heads, wanted)?,
+    let Channels { which, others } = match wanted {
+        [] => channels(heads),
+        _ => Channels { which: by_name(heads, wanted)?, others: Vec::new() },
     };
-    let column = |index: usize| rows.values.chunks_exact(heads.len()).map(move |row| row[index]).collect();
-    let known = heads.iter().enumerate().filter(|(_, head)| LEARNED.contains(&head.as_str()));
-    let known = known.map(|(index, head)| (head.clone(), column(index))).collect();
-    let values = rows.values.chunks_exact(heads.len()).flat_map(|row| channels.iter().map(|&index| row[index]));
-    let readings = Array { shape: vec![rows.rows(), channels.len()], values: values.collect() };
-    Ok(Columns { known, names: channels.iter().map(|&index| heads[index].clone()).collect(), readings })
+    let column = |index: usize| rows.of_columns(&[index]).values;
+    let is_known = |head: &String| LEARNED.contains(&head.as_str());
+    let known = heads.iter().enumerate().filter(|(_, head)| is_known(head));
+    Ok(Columns {
+        known: known.map(|(index, head)| (head.clone(), column(index))).collect(),
+        names: which.iter().map(|&index| heads[index].clone()).collect(),
+        readings: rows.of_columns(&which),
+        others: others.into_iter().filter(|other| !is_known(other)).collect(),
+        presses: heads.iter().position(|head| is_press(head)).map(column),
+    })
+}
+
+/// Whether a column of such a name says which press a row is of: `press`, `press_id`, `trial number`.
+fn is_press(name: &str) -> bool {
+    let lower = name.to_ascii_lowercase();
+    lower.split(|c: char| !c.is_alphanumeric()).next().is_some_and(|word| PRESS.contains(&word))
 }
 
 /// Where the channels of these names are.
@@ -106,7 +101,7 @@ fn arrays(arrays: Vec<(String, Array)>) -> Result<Columns, String> {
         }
     }
     let readings = readings.ok_or("an array readings_v, a row a press, is needed")?;
-    Ok(Columns { known, names: Vec::new(), readings })
+    Ok(Columns { known, ..Columns::of_readings(readings) })
 }
 
 #[cfg(test)]
@@ -124,34 +119,6 @@ mod tests {
     impl Owned for [&str] {
         fn map_owned(&self) -> Vec<String> {
             self.iter().map(|name| (*name).to_owned()).collect()
-        }
-    }
-
-    #[test]
-    fn what_counts_is_timed_or_has_another_unit_is_no_channel() {
-        for name in [
-            "",
-            "id",
-            "ID",
-            "press_id",
-            "Unnamed: 0",
-            "index",
-            "time",
-            "time_s",
-            "time(s)",
-            "t_ms",
-            "Timestamp",
-            "x_m",
-            "depth_m",
-            "robot_x_mm",
-            "torque_n",
-            "frame",
-            "press number",
-        ] {
-            assert!(!is_channel(name), "{name}");
-        }
-        for name in ["ch0", "0", "e3_g4", "row0_col3", "v", "reading_v", "a_mv", "grid", "s", "m", "times", "id_3"] {
-            assert!(is_channel(name), "{name}");
         }
     }
 

@@ -22,7 +22,7 @@ impl Kernel {
 
     /// Writes it.
     pub fn to_container(&self, to: &mut Container) {
-        let (channels, presses) = (self.channels(), self.points.count());
+        let (channels, rows) = (self.channels(), self.points.count());
         let names = serde_json::Value::from(self.names.clone());
         to.set_text("channels", names.to_string());
         if let Some(drive_v) = self.features.drive_v {
@@ -32,8 +32,9 @@ impl Kernel {
         to.set_array("mean", &[channels], &self.features.mean);
         to.set_array("scale", &[channels], &self.features.scale);
         to.set_array("axes", &[self.features.dimensions(), channels], &self.features.axes);
-        to.set_array("coordinates", &[presses, self.points.dimensions], &self.points.coordinates);
-        to.set_array("log_sizes", &[presses], &self.points.log_sizes);
+        to.set_array("coordinates", &[rows, self.points.dimensions], &self.points.coordinates);
+        to.set_array("log_sizes", &[rows], &self.points.log_sizes);
+        to.set_text("presses", self.presses.to_string());
         write_regression(to, "place", &self.places);
         if let Some(middle_m) = self.middle_m {
             to.set_text("middle_m", middle_m.to_string());
@@ -87,6 +88,11 @@ impl Kernel {
             middle_m: match from.has_text("middle_m") {
                 true => Some(from.number("middle_m", |metres| metres >= 0.0, "a distance of 0 or more")?),
                 false => None,
+            },
+            // Files of before count rows.
+            presses: match from.has_text("presses") {
+                true => from.number("presses", |presses| presses >= 1.0, "a number of presses")? as usize,
+                false => points.count(),
             },
             features,
             points,

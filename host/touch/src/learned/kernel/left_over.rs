@@ -30,12 +30,13 @@ pub struct LeftOver {
 }
 
 impl LeftOver {
-    /// For presses in such classes.
-    pub fn of(features: &Features, described: &[Described], classes: &Classes) -> Self {
+    /// For presses in such classes; `presses` tells of which one each description is.
+    pub fn of(features: &Features, described: &[Described], classes: &Classes, presses: &[usize]) -> Self {
         let channels = features.mean.len();
-        let most = MOST_DIMENSIONS.min(described.len() / PRESSES_EACH).min(channels / CHANNELS_EACH).max(1);
+        let count = presses.iter().max().map_or(0, |last| last + 1);
+        let most = MOST_DIMENSIONS.min(count / PRESSES_EACH).min(channels / CHANNELS_EACH).max(1);
         let dimensions = most.min(features.dimensions());
-        let left: Vec<Vec<f64>> = left_out(features, described, dimensions);
+        let left: Vec<Vec<f64>> = left_out(features, described, dimensions, described.len() as f64 / count.max(1) as f64);
         let sizes_v: Vec<f64> = described.iter().map(|described| described.size_v).collect();
         let mut this = Self { dimensions, deviations: Vec::new(), lengths: Vec::new(), channels: Vec::new() };
         for class in 0..classes.count() {
@@ -73,13 +74,13 @@ impl LeftOver {
 }
 
 /// What is left over of each press if the dimensions are those of the others: by its leverage, which is exact for a regression on the
-/// coordinates and nearly so for the dimensions themselves.
-fn left_out(features: &Features, described: &[Described], dimensions: usize) -> Vec<Vec<f64>> {
+/// coordinates and nearly so for the dimensions themselves. A press of several rows has as many times the leverage of one.
+fn left_out(features: &Features, described: &[Described], dimensions: usize, rows_each: f64) -> Vec<Vec<f64>> {
     let sum = |axis: usize| described.iter().map(|described| described.coordinates[axis].powi(2)).sum::<f64>();
     let sums: Vec<f64> = (0..dimensions).map(sum).collect();
     let left = |described_one: &Described| {
         let along = described_one.coordinates.iter().zip(&sums).map(|(along, sum)| along * along / sum).sum::<f64>();
-        let leverage = (along + 1.0 / described.len() as f64).min(MOST_LEVERAGE);
+        let leverage = (rows_each * (along + 1.0 / described.len() as f64)).min(MOST_LEVERAGE);
         features.left_over(described_one, dimensions).iter().map(|left| left / (1.0 - leverage)).collect()
     };
     described.iter().map(left).collect()

@@ -54,6 +54,8 @@ pub struct Kernel {
     limits: Limits,
     /// How far the middle of the others is from each press, in the root of the mean square (m); of a file that tells.
     middle_m: Option<f64>,
+    /// Presses that the points are of: some may be of one.
+    presses: usize,
 }
 
 /// What was taught.
@@ -93,20 +95,20 @@ impl Kernel {
         let alike = || TeachError("their readings are all alike".to_owned());
         let told: Vec<_> =
             Description::ALL.into_iter().filter_map(|description| Told::of(presses, description)).collect();
-        let places_m = presses.places_m.concat();
-        let learned = told.iter().filter_map(|told| Some((told, Regression::learn(&told.places(&places_m))?)));
+        let (places_m, of) = (presses.places_m.concat(), presses.groups());
+        let learned = told.iter().filter_map(|told| Some((told, Regression::learn(&told.places(&places_m, &of))?)));
         let best = learned.min_by(|(_, a), (_, b)| a.missed().total_cmp(&b.missed()));
         let (told, places) = best.ok_or_else(alike)?;
         let Told { features, described, points } = told;
         let shares = shares(presses, points);
-        let lesson = told.strengths(&shares);
+        let lesson = told.strengths(&shares, &of);
         let strengths = match presses.strength {
             Some(strength) => Some((strength, Regression::learn(&lesson).ok_or_else(alike)?)),
             None => None,
         };
         let sizes_v: Vec<f64> = described.iter().map(|described| described.size_v).collect();
         let classes = Classes::of(&sizes_v);
-        let left_over = LeftOver::of(features, described, &classes);
+        let left_over = LeftOver::of(features, described, &classes, &of);
         let limits = Limits {
             places_m: [0, 1, 2].map(|axis| range(presses.places_m.iter().map(|place_m| place_m[axis]))),
             shares: range(shares.iter().copied()),
@@ -118,7 +120,7 @@ impl Kernel {
         Ok(Self {
             names: presses.names.clone(),
             features: features.clone().keeping(compared.max(left_over.dimensions)),
-            novelty: Novelty::of(&places, &points, &classes),
+            novelty: Novelty::of(&places, &points, &classes, &of),
             points,
             places,
             strengths,
@@ -126,6 +128,7 @@ impl Kernel {
             left_over,
             limits,
             middle_m: Some(middle_m(&presses.places_m)),
+            presses: of.iter().max().map_or(0, |last| last + 1),
         })
     }
 
@@ -164,6 +167,11 @@ impl Kernel {
 
     /// Presses that it has learned from.
     pub fn presses(&self) -> usize {
+        self.presses
+    }
+
+    /// Rows of readings of those.
+    pub fn rows(&self) -> usize {
         self.points.count()
     }
 
@@ -249,20 +257,20 @@ impl Told {
         Some(Self { features, described, points })
     }
 
-    fn places<'a>(&'a self, places_m: &'a [f64]) -> Lesson<'a> {
+    fn places<'a>(&'a self, places_m: &'a [f64], presses: &'a [usize]) -> Lesson<'a> {
         let size_weight = match (self.features.description, self.features.drive_v) {
             (Description::Directions, None) => SIZE_FOR_PLACE,
             _ => 0.0,
         };
-        Lesson { points: &self.points, targets: places_m, count: 3, size_weight }
+        Lesson { points: &self.points, targets: places_m, count: 3, size_weight, presses }
     }
 
-    fn strengths<'a>(&'a self, shares: &'a [f64]) -> Lesson<'a> {
+    fn strengths<'a>(&'a self, shares: &'a [f64], presses: &'a [usize]) -> Lesson<'a> {
         let size_weight = match self.features.description {
             Description::Directions => SIZE_FOR_STRENGTH,
             Description::Channels => 0.0,
         };
-        Lesson { points: &self.points, targets: shares, count: 1, size_weight }
+        Lesson { points: &self.points, targets: shares, count: 1, size_weight, presses }
     }
 }
 

@@ -23,12 +23,12 @@ pub struct Novelty {
 }
 
 impl Novelty {
-    /// For a regression that has learned from presses in such classes.
-    pub fn of(regression: &Regression, points: &Points, classes: &Classes) -> Self {
+    /// For a regression that has learned from presses in such classes; `presses` tells of which one each point is.
+    pub fn of(regression: &Regression, points: &Points, classes: &Classes, presses: &[usize]) -> Self {
         let mut novelty = Self::with_limits(regression, points, Vec::new());
         let variance = |press: usize| {
             let [squares, _] = points.squares_to(points.at(press), novelty.likeness.components, 0);
-            novelty.variance(points, &squares, points.log_sizes[press], Some(press))
+            novelty.variance(points, &squares, points.log_sizes[press], |other| presses[other] != presses[press])
         };
         let variances: Vec<f64> = (0..points.count()).map(variance).collect();
         let sizes_v: Vec<f64> = points.log_sizes.iter().map(|log| log.exp()).collect();
@@ -44,14 +44,14 @@ impl Novelty {
 
     /// Whether readings are new with such squares of the distances to the presses; of such a size and its class.
     pub fn is_new(&self, points: &Points, squares: &[f64], log_size: f64, class: usize) -> bool {
-        self.variance(points, squares, log_size, None) > self.limits[class]
+        self.variance(points, squares, log_size, |_| true) > self.limits[class]
     }
 
-    /// The variance by all presses but one.
-    fn variance(&self, points: &Points, squares: &[f64], log_size: f64, but: Option<usize>) -> f64 {
+    /// The variance by the points that count.
+    fn variance(&self, points: &Points, squares: &[f64], log_size: f64, counts: impl Fn(usize) -> bool) -> f64 {
         let kernel = |press: usize| self.likeness.of(squares[press], log_size - points.log_sizes[press]);
         let mut near: Vec<(f64, usize)> =
-            squares.iter().copied().zip(0..).filter(|(_, press)| Some(*press) != but).collect();
+            squares.iter().copied().zip(0..).filter(|(_, point)| counts(*point)).collect();
         if near.len() > NEIGHBOURS {
             near.select_nth_unstable_by(NEIGHBOURS, |a, b| a.0.total_cmp(&b.0));
             near.truncate(NEIGHBOURS);
@@ -88,9 +88,10 @@ mod tests {
         let coordinates: Vec<f64> = (0..60).map(|i| f64::from(i) / 60.0).collect();
         let targets: Vec<f64> = coordinates.iter().map(|x| (5.0 * x).sin()).collect();
         let points = Points::new(Description::Directions, 1, coordinates, vec![0.0; 60]);
-        let lesson = Lesson { points: &points, targets: &targets, count: 1, size_weight: 0.0 };
+        let presses: Vec<usize> = (0..60).collect();
+        let lesson = Lesson { points: &points, targets: &targets, count: 1, size_weight: 0.0, presses: &presses };
         let regression = Regression::learn(&lesson).unwrap();
-        let novelty = Novelty::of(&regression, &points, &Classes::of(&[1.0; 60]));
+        let novelty = Novelty::of(&regression, &points, &Classes::of(&[1.0; 60]), &presses);
         let is_new = |at: f64| novelty.is_new(&points, &points.squares_to(&[at], 1, 1)[0], 0.0, 0);
         assert!(!is_new(0.505) && !is_new(0.11));
         assert!(is_new(2.0) && is_new(-0.7));

@@ -1,5 +1,6 @@
 //! Presses at known places: what a kernel learns from.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::columns::Columns;
@@ -7,6 +8,13 @@ use tactomo_table::{Table, TableError};
 
 /// Fewest presses that anything is learned from.
 const FEWEST: usize = 10;
+/// Rows whose places are this near (m) are of one press, or of presses at one place: robots repeat to 0.02 to 0.1 mm.
+const SAME_M: f64 = 1e-4;
+/// Farthest that a place is from the middle of all (m), hardest force (N) and deepest depth (m) that are believed: skins are smaller than a person, and no
+/// finger or indenter presses a foam with the weight of a man.
+const FARTHEST_M: f64 = 1.5;
+const HARDEST_N: f64 = 500.0;
+const DEEPEST_M: f64 = 0.1;
 
 /// Readings, places and strengths of presses, one contact each.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +31,10 @@ pub struct Presses {
     pub strengths: Vec<f64>,
     /// What was measured of it, if anything was.
     pub strength: Option<Strength>,
+    /// Which press each row is of, if that is told; rows at the same place are taken as of the same press too.
+    pub of: Option<Vec<f64>>,
+    /// Names of columns that are neither learned nor channels.
+    pub others: Vec<String>,
     /// Drive voltage (V), if the channels are the readings of a detector, row by row; else nothing is taken for granted.
     pub drive_v: Option<f64>,
 }
@@ -85,7 +97,7 @@ impl Presses {
         if matches!(&table, Table::Columns { names, .. } if names.is_empty()) {
             return Err("the first line must name the columns: x_m, y_m, perhaps force_n, and the channels".to_owned());
         }
-        let Columns { mut known, names, readings } = Columns::of(table, names)?;
+        let Columns { mut known, names, readings, others, presses } = Columns::of(table, names)?;
         let mut take = |name: &str| {
             let index = known.iter().position(|(known, _)| known == name)?;
             Some(known.swap_remove(index).1)
@@ -108,13 +120,73 @@ impl Presses {
             places_m: (0..x_m.len()).map(|i| [x_m[i], y_m[i], z_m[i]]).collect(),
             strength: strength.as_ref().map(|(strength, _)| *strength),
             strengths: strength.map_or_else(Vec::new, |(_, strengths)| strengths),
+            of: presses,
+            others,
             drive_v: None,
         };
         presses.check_each()?;
+        presses.check_units()?;
         Ok(presses)
     }
 
-    /// Number of presses.
+    /// The press that each row is of, by numbers from 0: rows of one press tell of each other, so they are left out together.
+    pub fn groups(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.count()).collect();
+        order.sort_by(|a, b| self.places_m[*a][0].total_cmp(&self.places_m[*b][0]));
+        let mut groups: Vec<usize> = (0..self.count()).collect();
+        let square_m2 = |a: usize, b: usize| -> f64 {
+            self.places_m[a].iter().zip(&self.places_m[b]).map(|(a, b)| (a - b).powi(2)).sum()
+        };
+        // The first row of a press stands for it, so that a slow slide is not one.
+        let mut firsts: Vec<usize> = Vec::new();
+        for row in order {
+            let is_near_x = |first: &&usize| self.places_m[row][0] - self.places_m[**first][0] < SAME_M;
+            let near = firsts.iter().rev().take_while(is_near_x).find(|first| square_m2(row, **first) < SAME_M * SAME_M);
+            match near.copied() {
+                Some(first) => groups[row] = first,
+                None => firsts.push(row),
+            }
+        }
+        if let Some(of) = &self.of {
+            let mut told: HashMap<u64, usize> = HashMap::new();
+            let mut joined: Vec<usize> = (0..groups.len()).collect();
+            for (row, press) in of.iter().enumerate() {
+                let other = *told.entry(press.to_bits()).or_insert(groups[row]);
+                let [one, other] = [groups[row], other].map(|group| root(&joined, group));
+                joined[one] = other;
+            }
+            groups.iter_mut().for_each(|group| *group = root(&joined, *group));
+        }
+        let mut numbers = HashMap::new();
+        groups.iter().map(|group| { let next = numbers.len(); *numbers.entry(*group).or_insert(next) }).collect()
+    }
+
+    /// Checks that places and strengths are such as a press can have.
+    fn check_units(&self) -> Result<(), String> {
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
+        let count = self.count() as f64;
+        for (axis, name) in ["x_m", "y_m", "z_m"].into_iter().enumerate() {
+            let mean_m = self.places_m.iter().map(|place_m| place_m[axis]).sum::<f64>() / count;
+            let farthest_m = largest(&mut self.places_m.iter().map(|place_m| place_m[axis] - mean_m));
+            if farthest_m > FARTHEST_M {
+                return Err(format!(
+                    "{name} goes {farthest_m:.4} m from the middle of all presses: are these millimetres? Divide them by 1000"
+                ));
+            }
+        }
+        let largest = largest(&mut self.strengths.iter().copied());
+        match self.strength {
+            Some(Strength::Force) if largest > HARDEST_N => {
+                Err(format!("force_n goes up to {largest:.4} N: are these grams? 1 N is 102 g: divide them by 102"))
+            }
+            Some(Strength::Depth) if largest > DEEPEST_M => {
+                Err(format!("depth_m goes up to {largest:.4} m: are these millimetres? Divide them by 1000"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Number of rows.
     pub fn count(&self) -> usize {
         self.places_m.len()
     }
@@ -129,7 +201,7 @@ impl Presses {
     /// # Errors
     /// What is wrong, with the number of the press, from 0.
     pub fn check(&self) -> Result<(), String> {
-        let count = self.count();
+        let count = self.groups().iter().max().map_or(0, |last| last + 1);
         if count < FEWEST {
             return Err(format!("{count} presses, but {FEWEST} at least are needed; some hundreds are good"));
         }
@@ -162,6 +234,14 @@ impl Presses {
         }
         Ok(())
     }
+}
+
+/// The group that stands for those that were joined with one.
+fn root(joined: &[usize], mut group: usize) -> usize {
+    while joined[group] != group {
+        group = joined[group];
+    }
+    group
 }
 
 #[cfg(test)]

@@ -17,6 +17,8 @@ fn five_channels(count: usize) -> Presses {
         strengths,
         strength: Some(Strength::Force),
         names: Vec::new(),
+        of: None,
+        others: Vec::new(),
         drive_v: None,
     }
 }
@@ -88,6 +90,8 @@ fn cells(count: usize, seed: u64) -> Presses {
         places_m: Vec::new(),
         strengths: Vec::new(),
         strength: Some(Strength::Force),
+        of: None,
+        others: Vec::new(),
         drive_v: None,
     };
     for _ in 0..count {
@@ -175,7 +179,7 @@ fn steady_presses_on_channels_of_unequal_gains_are_described_by_channels() {
     let mut errors_m = Vec::new();
     for description in Description::ALL {
         let told = Told::of(&unequal, description).unwrap();
-        errors_m.push(Regression::learn(&told.places(&unequal.places_m.concat())).unwrap().missed());
+        errors_m.push(Regression::learn(&told.places(&unequal.places_m.concat(), &unequal.groups())).unwrap().missed());
     }
     let kernel = Kernel::train(&unequal).unwrap();
     assert_eq!((kernel.description(), kernel.left_out_m()), (Description::Channels, errors_m[1]));
@@ -200,4 +204,41 @@ fn places_alone_are_learned() {
     let press = kernel.press(&presses.readings_v[..48]).unwrap().unwrap();
     assert_eq!((kernel.strength(), kernel.left_out_strength(), press.strength), (None, None, None));
     assert!((press.place_m[0] - presses.places_m[0][0]).abs() < 0.002, "{press:?}");
+}
+
+/// The same presses, each in so many rows with noise of their own, in an order that mixes them.
+fn in_rows(presses: &Presses, rows: usize, seed: u64) -> Presses {
+    let mut noise = tactomo_physics::simulate::Noise::new(seed);
+    let mut order: Vec<usize> = (0..presses.count() * rows).map(|row| row / rows).collect();
+    fastrand::Rng::with_seed(seed).shuffle(&mut order);
+    let readings = |press: &usize| &presses.readings_v[48 * press..][..48];
+    Presses {
+        readings_v: order.iter().flat_map(readings).map(|volts| volts + 0.001 * noise.normal()).collect(),
+        places_m: order.iter().map(|press| presses.places_m[*press]).collect(),
+        strengths: order.iter().map(|press| presses.strengths[*press]).collect(),
+        of: None,
+        ..presses.clone()
+    }
+}
+
+#[test]
+fn of_presses_of_several_rows_whole_ones_are_left_out() {
+    let (few, unseen) = (cells(40, 31), cells(200, 131));
+    for rows in [1, 6] {
+        let taught = in_rows(&few, rows, 5);
+        let kernel = Kernel::train(&taught).unwrap();
+        let squares = (0..200).map(|index| {
+            let found_m = kernel.press(&unseen.readings_v[48 * index..][..48]).unwrap().unwrap().place_m;
+            found_m.iter().zip(&unseen.places_m[index]).map(|(found, is)| (found - is).powi(2)).sum::<f64>()
+        });
+        let unseen_m = (squares.sum::<f64>() / 200.0).sqrt();
+        let ratio = unseen_m / kernel.left_out_m();
+        assert!((0.5..2.0).contains(&ratio), "{rows} rows: told {}, unseen {unseen_m}", kernel.left_out_m());
+        assert_eq!((kernel.presses(), kernel.rows()), (40, 40 * rows));
+    }
+    // A column may say it, where places are measured anew in each row.
+    let apart = Presses { places_m: (0..80).map(|i| [1e-3 * f64::from(i), 0.0, 0.0]).collect(), ..in_rows(&few, 2, 5) };
+    assert_eq!(apart.groups().iter().max(), Some(&79));
+    let told = Presses { of: Some((0..80).map(|i| f64::from(i / 8)).collect()), ..apart };
+    assert_eq!(told.groups(), (0..80).map(|i| i / 8).collect::<Vec<_>>());
 }

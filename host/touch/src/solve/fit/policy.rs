@@ -15,6 +15,8 @@ thresholds! {
     /// Readings do not fit if more than this share of them is what no image gives; of touches of any shape it was 0.07 at most, of shorted,
     /// exchanged and inverted electrodes more than 0.09.
     outside_share: f64 = 0.08;
+    /// An answer of any method that leaves this share of the readings, in the root mean square, does not explain them.
+    left_share: f64 = 0.5;
     /// Peaks of a linear image at least so high, over the highest, are contacts, and a contact is where the image is so high, over its peak.
     peak_share: f32 = 0.6;
 

@@ -77,6 +77,8 @@ impl Presses {
             strengths: Vec::new(),
             strength: Some(Strength::Conductance),
             drive_v: Some(detector.drive_v),
+            of: None,
+            others: Vec::new(),
         };
         // Most outlines fill more than a quarter of their bounding boxes.
         for contact in (0..4 * count).filter_map(|index| simulated_contact(problem, index)) {

@@ -4,7 +4,7 @@
 //!    converter's range, are [completed](crate::solve::before) for methods that need all;
 //! 2. the [method](method) makes contacts, a shape or an image of them;
 //! 3. after: contacts of a detector with a law of force carry [newtons](crate::solve::after), and those of a detector that was corrected by known presses are
-//!    where these say.
+//!    where these say; an answer of any method that leaves much of the readings is [flagged](Unexplained).
 //!
 //! A recording goes the same way as a live sensor. Live, the two halves of a solver run side by side ([`Solver::split`]): each of them is [`Staged`].
 //! A [`FaultTolerant`](fault_tolerant::FaultTolerant) watches which electrodes are wrong, and leaves them out.
@@ -12,11 +12,13 @@
 pub(crate) mod fault_tolerant;
 pub(crate) mod method;
 pub(crate) mod parameter;
+mod unexplained;
 pub(crate) mod without;
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use self::unexplained::Unexplained;
 use self::without::Lens;
 use crate::solve::after::correct::Corrector;
 use crate::solve::after::force::Scale;
@@ -36,6 +38,8 @@ pub(crate) struct Stages {
     scale: Option<Arc<Scale>>,
     /// What known presses have corrected.
     corrector: Option<Arc<Corrector>>,
+    /// What flags answers that leave much of the readings.
+    unexplained: Option<Unexplained>,
 }
 
 impl Stages {
@@ -44,6 +48,7 @@ impl Stages {
         Self {
             scale: Scale::of(problem).map(Arc::new),
             corrector: Corrector::of(problem.detector()).map(Arc::new),
+            unexplained: Some(Unexplained::of(problem.detector())),
             ..Self::default()
         }
     }
@@ -80,7 +85,10 @@ impl Stages {
         if let Some(lens) = &self.lens {
             solution = lens.flagged(solution);
         }
-        solution
+        match &self.unexplained {
+            Some(unexplained) => unexplained.flagged(seen, solution),
+            None => solution,
+        }
     }
 
     fn after_following(&self, seen: &Readings, Followed { solution, search }: Followed) -> Followed {

@@ -1,0 +1,42 @@
+//! Answers that leave much of the readings are flagged, whatever method they are of.
+//!
+//! A method knows its own errors best, and flags a misfit by them; this is what holds for all. Two things make an answer a misfit:
+//! - what it leaves of the readings is more than noise, and most of them;
+//! - readings are below those at rest. What touches conducts from the driving layer, so that no pad of a passive detector falls: such readings have
+//!   the wrong sign, or something pressed while the baseline was taken.
+
+use crate::solve::answer::Solution;
+use crate::solve::fit::policy;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
+
+/// Flags answers that leave much of the readings.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unexplained {
+    /// Standard deviation of a reading by noise (V).
+    noise_v: f64,
+}
+
+impl Unexplained {
+    /// For readings of a detector.
+    pub fn of(detector: &Detector) -> Self {
+        Self { noise_v: detector.adc.deviation_v() }
+    }
+
+    /// The answer to these readings, flagged if it leaves much of them.
+    pub fn flagged(&self, readings: &Readings, mut solution: Solution) -> Solution {
+        let (size_v, below_v) = (readings.rms_v(), readings.rms_below_rest_v());
+        let says_nothing = solution.contacts.is_empty() && solution.is_contacts();
+        let left_v = match solution.residual {
+            Some(residual) => residual * self.noise_v,
+            None if says_nothing => size_v,
+            None => 0.0,
+        };
+        let is_large = |volts: f64, share: f64| volts > policy::misfit_deviations() * self.noise_v && volts > share * size_v;
+        if is_large(left_v, policy::left_share()) || is_large(below_v, policy::outside_share()) {
+            solution.flags.misfit = true;
+            (solution.certainty, solution.alternative) = (None, None);
+        }
+        solution
+    }
+}
