@@ -17,9 +17,43 @@ const UNITS: [&str; 16] =
     ["s", "ms", "us", "ns", "m", "mm", "um", "n", "mn", "g", "kg", "pa", "kpa", "deg", "rad", "degc"];
 /// Words of poses and forces.
 const ELSE: [&str; 37] = [
-    "x", "y", "z", "rx", "ry", "rz", "qx", "qy", "qz", "qw", "fx", "fy", "fz", "mx", "my", "mz", "tx", "ty", "tz", "roll", "pitch",
-    "yaw", "pose", "position", "orientation", "quaternion", "force", "torque", "moment", "joint", "robot", "tcp", "depth", "speed",
-    "velocity", "temperature", "weight",
+    "x",
+    "y",
+    "z",
+    "rx",
+    "ry",
+    "rz",
+    "qx",
+    "qy",
+    "qz",
+    "qw",
+    "fx",
+    "fy",
+    "fz",
+    "mx",
+    "my",
+    "mz",
+    "tx",
+    "ty",
+    "tz",
+    "roll",
+    "pitch",
+    "yaw",
+    "pose",
+    "position",
+    "orientation",
+    "quaternion",
+    "force",
+    "torque",
+    "moment",
+    "joint",
+    "robot",
+    "tcp",
+    "depth",
+    "speed",
+    "velocity",
+    "temperature",
+    "weight",
 ];
 /// A stem with fewer than this share of the columns of the most frequent one is of something else.
 const FEW: usize = 4;
@@ -42,8 +76,10 @@ pub fn channels(names: &[String]) -> Channels {
     let most = stems.iter().filter(|stem| stem.is_some()).map(of_stem).max().unwrap_or_default();
     let are_numbered = 2 * numbered > stems.len() && most > 1;
     let is_channel = |stem: &Option<String>| !are_numbered || stem.is_some() && FEW * of_stem(stem) >= most;
-    let which: Vec<usize> = may_be.iter().zip(&stems).filter(|(_, stem)| is_channel(stem)).map(|(&column, _)| column).collect();
-    let others = (0..names.len()).filter(|column| !which.contains(column)).map(|column| names[column].clone()).collect();
+    let which: Vec<usize> =
+        may_be.iter().zip(&stems).filter(|(_, stem)| is_channel(stem)).map(|(&column, _)| column).collect();
+    let others =
+        (0..names.len()).filter(|column| !which.contains(column)).map(|column| names[column].clone()).collect();
     Channels { which, others }
 }
 
@@ -74,12 +110,51 @@ mod tests {
     #[test]
     fn what_counts_is_timed_has_another_unit_or_is_a_pose_is_no_channel() {
         for name in [
-            "", "id", "ID", "press_id", "Unnamed: 0", "index", "time", "time_s", "time(s)", "t_ms", "Timestamp", "x_m", "depth_m",
-            "robot_x_mm", "torque_n", "frame", "press number", "Fz", "fz", "Fz [N]", "Force (N)", "rx", "qw", "tcp_pose_z", "roll", "x",
+            "",
+            "id",
+            "ID",
+            "press_id",
+            "Unnamed: 0",
+            "index",
+            "time",
+            "time_s",
+            "time(s)",
+            "t_ms",
+            "Timestamp",
+            "x_m",
+            "depth_m",
+            "robot_x_mm",
+            "torque_n",
+            "frame",
+            "press number",
+            "Fz",
+            "fz",
+            "Fz [N]",
+            "Force (N)",
+            "rx",
+            "qw",
+            "tcp_pose_z",
+            "roll",
+            "x",
         ] {
             assert_eq!(of(&[name]), [] as [usize; 0], "{name}");
         }
-        for name in ["ch0", "0", "e3_g4", "row0_col3", "v", "reading_v", "a_mv", "grid", "s", "m", "times", "id_3", "force_3", "V1 [mV]"] {
+        for name in [
+            "ch0",
+            "0",
+            "e3_g4",
+            "row0_col3",
+            "v",
+            "reading_v",
+            "a_mv",
+            "grid",
+            "s",
+            "m",
+            "times",
+            "id_3",
+            "force_3",
+            "V1 [mV]",
+        ] {
             assert_eq!(of(&[name]), [0], "{name}");
         }
     }
@@ -91,7 +166,8 @@ mod tests {
         };
         let all = channels(&names(&["gripper", "A1", "A2", "A3", "A4", "A5", "A6", "label"]));
         assert_eq!((all.which.len(), all.others.len()), (32, 8));
-        let halves: Vec<String> = ["left", "right"].iter().flat_map(|side| (0..8).map(move |i| format!("{side}_{i}"))).collect();
+        let halves: Vec<String> =
+            ["left", "right"].iter().flat_map(|side| (0..8).map(move |i| format!("{side}_{i}"))).collect();
         assert_eq!(channels(&halves).which.len(), 16);
         assert_eq!(of(&["a", "b", "c"]), [0, 1, 2]);
         assert_eq!(of(&["0", "1", "2", "label"]), [0, 1, 2]);

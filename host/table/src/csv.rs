@@ -198,7 +198,11 @@ impl Rows {
         if let Some(what) = what.clone().filter(|_| 2 * wrong > self.count) {
             return Err(what);
         }
-        Ok(Text { names: self.names, rows: Array { shape: vec![self.count, self.columns], values: self.values }, wrong: what })
+        Ok(Text {
+            names: self.names,
+            rows: Array { shape: vec![self.count, self.columns], values: self.values },
+            wrong: what,
+        })
     }
 }
 
@@ -299,7 +303,8 @@ mod tests {
     fn rows_that_are_no_numbers_and_a_cut_last_line_are_no_numbers_where_others_are_right() {
         let text = super::parse("a,b\n1,2\n3,ERROR\n5,6\n7,8\n9").unwrap();
         assert_eq!(text.rows.shape, [5, 2]);
-        let is_wrong: Vec<bool> = text.rows.values.chunks(2).map(|row| row.iter().all(|value| value.is_nan())).collect();
+        let is_wrong: Vec<bool> =
+            text.rows.values.chunks(2).map(|row| row.iter().all(|value| value.is_nan())).collect();
         assert_eq!(is_wrong, [false, true, false, false, true]);
         assert_eq!(text.wrong.as_deref(), Some("line 3, column 2: `ERROR` is not a number"));
         assert!(super::parse("1,2\nx,y\n3,z\n").is_err(), "most are wrong");

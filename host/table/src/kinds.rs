@@ -112,7 +112,9 @@ mod tests {
     fn text_in_other_encodings_is_read() {
         let text = "spannung \u{b5}V;b\r\n0,5;2\r\n";
         let units: Vec<u16> = text.encode_utf16().collect();
-        let with = |mark: &[u8], of: fn(u16) -> [u8; 2]| [mark, &units.iter().flat_map(|unit| of(*unit)).collect::<Vec<u8>>()].concat();
+        let with = |mark: &[u8], of: fn(u16) -> [u8; 2]| {
+            [mark, &units.iter().flat_map(|unit| of(*unit)).collect::<Vec<u8>>()].concat()
+        };
         let latin: Vec<u8> = text.chars().map(|character| character as u8).collect();
         for bytes in [
             with(&[0xff, 0xfe], u16::to_le_bytes),
@@ -122,7 +124,9 @@ mod tests {
             latin,
         ] {
             let table = Table::parse(&bytes).unwrap();
-            assert!(matches!(table, Table::Columns { names, rows } if names[0] == "spannung \u{b5}V" && rows.values == [0.5, 2.0]));
+            assert!(
+                matches!(table, Table::Columns { names, rows } if names[0] == "spannung \u{b5}V" && rows.values == [0.5, 2.0])
+            );
         }
     }
 }

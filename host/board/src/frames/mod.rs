@@ -384,7 +384,8 @@ mod tests {
     fn rows_that_are_no_numbers_are_left_out_and_counted() {
         let values = [1.0, 2.0, f64::NAN, 4.0, 5.0, f64::INFINITY, 7.0, 8.0].to_vec();
         let mut rows = Rows::of(Array { shape: vec![4, 2], values }, None).unwrap();
-        let frames: Vec<_> = std::iter::from_fn(|| rows.next_frame()).map(|frame| (frame.volts[0], frame.lost_before)).collect();
+        let frames: Vec<_> =
+            std::iter::from_fn(|| rows.next_frame()).map(|frame| (frame.volts[0], frame.lost_before)).collect();
         assert_eq!(frames, [(1.0, 0), (7.0, 2)]);
         assert_eq!(rows.left_out.to_string(), "2 rows are left out: row 2, column 1 is not a finite number");
     }
@@ -392,10 +393,24 @@ mod tests {
     #[test]
     fn numbers_of_columns_are_told_apart() {
         for (columns, word) in [
-            (240, "16 x 15"), (208, "EIT"), (104, "EIT"), (120, "pair"), (136, "pair"), (512, "imaginary"), (257, "one column"),
-            (260, "4 columns"), (16, "one grounded"), (768, "3 frames"), (64, "8 electrodes"), (1024, "4 frames"),
+            (240, "16 x 15"),
+            (208, "EIT"),
+            (104, "EIT"),
+            (120, "pair"),
+            (136, "pair"),
+            (512, "imaginary"),
+            (257, "one column"),
+            (260, "4 columns"),
+            (16, "one grounded"),
+            (768, "3 frames"),
+            (64, "8 electrodes"),
+            (1024, "4 frames"),
         ] {
-            assert!(likely(columns, 16).is_some_and(|what| what.contains(word)), "{columns}: {:?}", likely(columns, 16));
+            assert!(
+                likely(columns, 16).is_some_and(|what| what.contains(word)),
+                "{columns}: {:?}",
+                likely(columns, 16)
+            );
         }
         assert_eq!(likely(250, 16), None);
     }

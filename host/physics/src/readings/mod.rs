@@ -203,9 +203,8 @@ impl Readings {
     fn rms_of(&self, part: impl Fn(f64) -> f64) -> f64 {
         let n = self.electrodes.max(1);
         let read = (0..self.volts.len()).filter(|i| self.says.get(*i) != Some(&Says::Nothing));
-        let (count, squares) = read.fold((0usize, 0.0), |(count, squares), i| {
-            (count + 1, squares + part(self.touch_v(i / n, i % n)).powi(2))
-        });
+        let (count, squares) = read
+            .fold((0usize, 0.0), |(count, squares), i| (count + 1, squares + part(self.touch_v(i / n, i % n)).powi(2)));
         (squares / count.max(1) as f64).sqrt()
     }
 

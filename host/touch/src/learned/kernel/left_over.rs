@@ -36,7 +36,8 @@ impl LeftOver {
         let count = presses.iter().max().map_or(0, |last| last + 1);
         let most = MOST_DIMENSIONS.min(count / PRESSES_EACH).min(channels / CHANNELS_EACH).max(1);
         let dimensions = most.min(features.dimensions());
-        let left: Vec<Vec<f64>> = left_out(features, described, dimensions, described.len() as f64 / count.max(1) as f64);
+        let left: Vec<Vec<f64>> =
+            left_out(features, described, dimensions, described.len() as f64 / count.max(1) as f64);
         let sizes_v: Vec<f64> = described.iter().map(|described| described.size_v).collect();
         let mut this = Self { dimensions, deviations: Vec::new(), lengths: Vec::new(), channels: Vec::new() };
         for class in 0..classes.count() {

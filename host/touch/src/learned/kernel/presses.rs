@@ -141,7 +141,8 @@ impl Presses {
         let mut firsts: Vec<usize> = Vec::new();
         for row in order {
             let is_near_x = |first: &&usize| self.places_m[row][0] - self.places_m[**first][0] < SAME_M;
-            let near = firsts.iter().rev().take_while(is_near_x).find(|first| square_m2(row, **first) < SAME_M * SAME_M);
+            let near =
+                firsts.iter().rev().take_while(is_near_x).find(|first| square_m2(row, **first) < SAME_M * SAME_M);
             match near.copied() {
                 Some(first) => groups[row] = first,
                 None => firsts.push(row),
@@ -158,7 +159,13 @@ impl Presses {
             groups.iter_mut().for_each(|group| *group = root(&joined, *group));
         }
         let mut numbers = HashMap::new();
-        groups.iter().map(|group| { let next = numbers.len(); *numbers.entry(*group).or_insert(next) }).collect()
+        groups
+            .iter()
+            .map(|group| {
+                let next = numbers.len();
+                *numbers.entry(*group).or_insert(next)
+            })
+            .collect()
     }
 
     /// Checks that places and strengths are such as a press can have.

@@ -18,7 +18,8 @@ impl Kernel {
             }
             false => "",
         };
-        let rows = if self.rows() > self.presses() { format!(" ({} rows of readings)", self.rows()) } else { String::new() };
+        let rows =
+            if self.rows() > self.presses() { format!(" ({} rows of readings)", self.rows()) } else { String::new() };
         format!(
             "learned from {} presses{rows} on {} channels, in {} dimensions of {}; a press that is left out is found within {:.2} mm{strength} (root mean \
              square){middle}{warning}",

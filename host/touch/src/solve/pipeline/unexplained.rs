@@ -32,7 +32,8 @@ impl Unexplained {
             None if says_nothing => size_v,
             None => 0.0,
         };
-        let is_large = |volts: f64, share: f64| volts > policy::misfit_deviations() * self.noise_v && volts > share * size_v;
+        let is_large =
+            |volts: f64, share: f64| volts > policy::misfit_deviations() * self.noise_v && volts > share * size_v;
         if is_large(left_v, policy::left_share()) || is_large(below_v, policy::outside_share()) {
             solution.flags.misfit = true;
             (solution.certainty, solution.alternative) = (None, None);
