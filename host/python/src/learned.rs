@@ -160,6 +160,8 @@ pub fn learn(
         strengths,
         strength,
         drive_v: detector.map(|detector| detector.0.drive_v),
+        of: None,
+        others: Vec::new(),
     };
     let bytes = py.detach(|| Taught::bytes_of(&Kernel::train(&presses).map_err(raised)?).map_err(raised))?;
     Learned::of(bytes)
