@@ -10,7 +10,6 @@ use crate::samples::{CELLS, field_ohm, fields_ohm, grid_m, table, table_of};
 use crate::scan::{Candidate, NO_CANDIDATES, first};
 use crate::search::{Search, Wants};
 use crate::solver::Task;
-use crate::table::MAX_ELECTRODES;
 use crate::tests::{noisy, spot, volts};
 use crate::{Flags, Frame, MOST_PIECES, Says, Solver, Table};
 
@@ -502,7 +501,7 @@ fn a_search_ends_on_any_readings_and_says_so() {
         assert!(!answer.flags.has(Flags::MISFIT) || next.work.looks == 0, "{next:?}");
     }
     // What was followed before, and the last look.
-    assert!(longest <= MOST_PIECES + 30 && longest >= MOST_PIECES, "{longest}");
+    assert!((MOST_PIECES..=MOST_PIECES + 30).contains(&longest), "{longest}");
 }
 
 #[test]
