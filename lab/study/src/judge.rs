@@ -140,7 +140,7 @@ mod tests {
         let choice = |what: &str| Some(Choice { what: what.to_owned(), why: String::new() });
         let line = FoundShape::Line(FoundLine::default());
         let ring = FoundShape::Ring(FoundRing::default());
-        for shape in [line.clone(), ring.clone()] {
+        for shape in [line, ring] {
             let answer = Solution { shape: Some(shape), choice: choice("line"), ..contacts.clone() };
             let judged = Judged::of(WRONG_M, &two, &answer);
             assert!(!judged.is_right(|_| true) && !judged.is_number_right() && judged.near.missed.len() == 2);
@@ -151,7 +151,7 @@ mod tests {
         assert!(is_right(&two, &peaks), "a solver that does not choose has contacts beside every image");
         let bar = Touch::flat([0.0; 2], Shape::Line { length_m: 0.02, width_m: 2e-3, angle_rad: 0.0 }, 1e-3);
         let of = |shape| Solution { shape: Some(shape), ..Solution::default() };
-        assert!(is_right(&[bar.clone()], &of(line)) && !is_right(&[bar.clone()], &of(ring)));
+        assert!(is_right(std::slice::from_ref(&bar), &of(line)) && !is_right(std::slice::from_ref(&bar), &of(ring)));
         assert!(!is_right(&[bar], &contacts));
     }
 

@@ -262,7 +262,7 @@ mod tests {
 
     /// A row of a frame a point, in the order of severities, and where it breaks.
     fn row(scores: &[Score]) -> (Vec<Option<CellReport>>, Option<Break>) {
-        let mut cells: Vec<_> = scores.iter().map(|one| Some(cell(&[one.clone()], &scores[..1]))).collect();
+        let mut cells: Vec<_> = scores.iter().map(|one| Some(cell(std::slice::from_ref(one), &scores[..1]))).collect();
         let labels: Vec<String> = (0..scores.len()).map(|index| index.to_string()).collect();
         let severities: Vec<f64> = (0..scores.len()).map(|index| index as f64).collect();
         let found = breaks(&labels.iter().map(String::as_str).collect::<Vec<_>>(), &severities, &mut cells);
