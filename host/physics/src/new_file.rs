@@ -1,8 +1,11 @@
 //! Files that are written. There is one rule for all of them: a file that exists is never replaced.
 
+use std::cell::RefCell;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+
+use tactomo_table::file::Unfinished;
 
 /// Why a file cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -86,8 +89,10 @@ pub fn sync(file: &File) -> io::Result<()> {
 #[derive(Debug)]
 pub struct NewFile {
     path: PathBuf,
-    /// Where it is written until it is complete; `None` of a device or a pipe.
-    unfinished: Option<PathBuf>,
+    /// Whether it is a device or a pipe, which is written to as it is.
+    is_open: bool,
+    /// Where it is written until it is complete.
+    unfinished: RefCell<Option<Unfinished>>,
 }
 
 impl NewFile {
@@ -99,13 +104,14 @@ impl NewFile {
         let own = path.to_owned();
         match fs::symlink_metadata(path).and_then(|_| fs::metadata(path)) {
             Ok(found) if found.is_dir() => Err(NewFileError::Folder { path: own }),
-            Ok(found) if !found.is_file() => Ok(Self { path: own, unfinished: None }),
+            Ok(found) if !found.is_file() => Ok(Self { path: own, is_open: true, unfinished: RefCell::default() }),
             // A link to nothing is something too.
             Err(_) if fs::symlink_metadata(path).is_err() => {
-                let unfinished = unfinished(path)?;
+                let file = Self { path: own, is_open: false, unfinished: RefCell::default() };
+                file.create()?;
                 // Whoever is ended before there is anything to write leaves no empty file.
-                drop(fs::remove_file(&unfinished));
-                Ok(Self { path: own, unfinished: Some(unfinished) })
+                file.unfinished.take();
+                Ok(file)
             }
             _ => Err(NewFileError::Exists { path: own }),
         }
@@ -129,8 +135,12 @@ impl NewFile {
     /// # Errors
     /// [`NewFileError`] if that fails.
     pub fn create(&self) -> Result<BufWriter<File>, NewFileError> {
-        let at = self.unfinished.as_ref().unwrap_or(&self.path);
-        create(at).map(BufWriter::new)
+        if self.is_open {
+            return create(&self.path).map(BufWriter::new);
+        }
+        let (unfinished, file) = Unfinished::beside(&self.path).map_err(|source| self.failed(source))?;
+        self.unfinished.replace(Some(unfinished));
+        Ok(BufWriter::new(file))
     }
 
     /// Why it cannot be written, as the system says it.
@@ -142,20 +152,9 @@ impl NewFile {
     ///
     /// # Errors
     /// [`NewFileError`] if that fails.
-    pub fn finish(mut self) -> Result<(), NewFileError> {
-        let Some(unfinished) = &self.unfinished else { return Ok(()) };
-        let named = match fs::hard_link(unfinished, &self.path) {
-            // Not every file system has links.
-            Err(error) if error.kind() != ErrorKind::AlreadyExists && fs::symlink_metadata(&self.path).is_err() => {
-                let named = fs::rename(unfinished, &self.path);
-                if named.is_ok() {
-                    self.unfinished = None;
-                }
-                named
-            }
-            linked => linked,
-        };
-        named.map_err(|source| self.failed(source))
+    pub fn finish(self) -> Result<(), NewFileError> {
+        let named = self.unfinished.take().map(|unfinished| unfinished.name(&self.path, false));
+        named.unwrap_or(Ok(())).map_err(|source| self.failed(source))
     }
 
     /// Writes all of it.
@@ -168,33 +167,6 @@ impl NewFile {
         self.finish()
     }
 }
-
-impl Drop for NewFile {
-    /// Leaves nothing of a file that was not completed.
-    fn drop(&mut self) {
-        if let Some(unfinished) = &self.unfinished {
-            drop(fs::remove_file(unfinished));
-        }
-    }
-}
-
-/// Makes an empty file beside `path`, of a name that no other has.
-fn unfinished(path: &Path) -> Result<PathBuf, NewFileError> {
-    let mut number = 1;
-    loop {
-        let mut name = path.to_owned().into_os_string();
-        name.push(if number == 1 { ".unfinished".to_owned() } else { format!(".unfinished-{number}") });
-        let unfinished = PathBuf::from(name);
-        match File::create_new(&unfinished) {
-            Ok(_) => return Ok(unfinished),
-            Err(error) if error.kind() == ErrorKind::AlreadyExists && number < MOST_UNFINISHED => number += 1,
-            Err(error) => return Err(NewFileError::of(path, error)),
-        }
-    }
-}
-
-/// So many unfinished files of one name are passed over.
-const MOST_UNFINISHED: u32 = 1000;
 
 #[cfg(test)]
 mod tests {
