@@ -104,7 +104,7 @@ fn an_image_for_another_board_or_none_is_told_before_a_tool_is_called() {
         (&elf(243, 0x4200_0020, (0x3fc8_0000, 8), 0), "esp32c3", "it begins at 0x00000000"),
         (&elf(243, 0x4200_0020, (0x3fc8_0000, 8), 0x3fc8_0000), "esp32c3", "where it has no code"),
         (&part, "esp32c3", "not linked yet"),
-        (&long, "esp32c3", "3997712 bytes of flash"),
+        (&long, "esp32c3", "3866640 bytes of flash, and there are 3866624"),
     ] {
         let path = tools.file("some.elf", image);
         let (code, message) = tools.flash(&[board, "--image", path.to_str().unwrap()], &tools.0);

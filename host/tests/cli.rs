@@ -449,7 +449,7 @@ fn a_stream_of_several_detectors_names_each_and_keeps_the_order_of_its_times() {
 fn boards_that_are_recorded_in_a_folder_are_cut_and_shown_again_as_one() {
     let folder = Folder::new("boards");
     let [taken, piece, mcap] = ["taken", "piece", "all.mcap"].map(|name| folder.path(name));
-    let args = ["live", "--simulate", "2", "--seconds", "1", "--json", "--record", &taken, "--mcap", &mcap];
+    let args = ["live", "--simulate", "2", "--seconds", "2", "--json", "--record", &taken, "--mcap", &mcap];
     let output = TACTOMO.run(&args);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let bytes = std::fs::read(&mcap).unwrap();
@@ -457,7 +457,7 @@ fn boards_that_are_recorded_in_a_folder_are_cut_and_shown_again_as_one() {
     assert!(has("/tactomo/board-1/touch") && has("/tactomo/board-2/readings") && !has("/tactomo/touch"));
     let again = TACTOMO.run(&args);
     assert!(again.status.code() == Some(1) && String::from_utf8_lossy(&again.stderr).contains("taken"));
-    let output = TACTOMO.run(&["recording", "cut", &taken, "--from", "0.4", "--out", &piece]);
+    let output = TACTOMO.run(&["recording", "cut", &taken, "--from", "1.4", "--out", &piece]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let frames = |folder: &str| -> Vec<u64> {
         ["board-1", "board-2"]

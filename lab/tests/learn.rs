@@ -46,7 +46,7 @@ fn what_is_learned_is_kept_scored_and_used() {
     assert!((of("depth_m") / (0.001 * (1.0 + truth[2])) - 1.0).abs() < 0.1, "{}", lines[7]);
     assert!(lines[7]["contacts"][0].get("conductance_s").is_none(), "depths were taught: {}", lines[7]);
     let before = std::fs::read(&model).unwrap();
-    assert!(LAB.refused(&["learn", &presses, "--out", &model]).contains("is not replaced"));
+    assert!(LAB.refused(&["learn", &presses, "--out", &model]).contains("no file is replaced"));
     assert_eq!(std::fs::read(&model).unwrap(), before);
 }
 

@@ -16,7 +16,7 @@ use tactomo_protocol::{Contacts, Hello, Output, Scope, TablePiece, TableState};
 pub use self::digitizer::Digitizer;
 pub use self::finder::ContactFinder;
 pub use self::flash::{FlashStore, RamCopy, View};
-pub use self::store::{RamStore, TableStore};
+pub use self::store::{CHUNK, RamStore, TableStore};
 use crate::scan::Scanned;
 
 /// What a board makes of its readings: [`NoTouch`], a [`ContactFinder`], or a [`Digitizer`] around one.

@@ -1,6 +1,6 @@
 //! A board that finds contacts by itself: it is given the table of its detector before it is asked for them.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use tactomo_board::identity::Sensor;
@@ -142,12 +142,20 @@ struct Kept {
 
 impl BoardTable {
     fn put(&self, bytes: Vec<u8>) {
-        *self.0.bytes.lock().unwrap_or_else(PoisonError::into_inner) = bytes;
+        *self.bytes() = bytes;
     }
 
-    /// Compiles the table of a detector, as its board measures it, once: for newtons of contacts that were recorded. A recording waits for that second.
+    fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
+        self.0.bytes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Compiles the table of a detector, as its board measures it, once, unless a board was given one: for newtons of contacts that were recorded. A recording
+    /// waits for that second.
     pub fn compile_once(&self, detector: &Detector) {
         self.0.is_compiled.get_or_init(|| {
+            if !self.bytes().is_empty() {
+                return;
+            }
             let compiled = || Ok(compile(&Problem::of(detector)?)?);
             match compiled() {
                 Ok(bytes) => self.put(bytes),
@@ -161,7 +169,7 @@ impl BoardTable {
     /// Adds newtons to contacts that the board has found.
     pub fn add_newtons(&self, law: &ForceLaw, contacts: &mut [FoundContact]) {
         // It was checked when it was given.
-        solve::add_newtons(&self.0.bytes.lock().unwrap_or_else(PoisonError::into_inner), law, contacts);
+        solve::add_newtons(&self.bytes(), law, contacts);
     }
 }
 

@@ -341,7 +341,7 @@ fn text_opens_no_file_whatever_it_names() {
     }
     let device = text.replace("fingertip.obj", "/dev/zero");
     let wrong = Detector::from_toml_in(Path::new(""), &device, "x").unwrap_err().to_string();
-    assert!(wrong.contains("it is no file"), "{wrong}");
+    assert!(wrong.contains("it is no regular file"), "{wrong}");
 }
 
 #[test]
