@@ -46,4 +46,4 @@ pub use parts::{Chip, Parts, Sampler, Serial, TimedOut};
 pub use row::Row;
 pub use scan::Scanned;
 pub use side_by_side::{ConverterPair, SideBySide};
-pub use touch::{ContactFinder, Digitizer, FlashStore, NoTouch, RamCopy, RamStore, TableStore, Touch, View};
+pub use touch::{CHUNK, ContactFinder, Digitizer, FlashStore, NoTouch, RamCopy, RamStore, TableStore, Touch, View};
