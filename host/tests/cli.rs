@@ -359,9 +359,9 @@ fn a_press_in_newtons_is_the_contact_that_hertz_tells() {
     assert_eq!(rows(&["--contact", "2,3,1.888814,6.627302e-6"]), rows(&["--press", "2,3,8,1"]));
 }
 
-/// Names of the patches that a skin's detectors were told by, in their order, and how it ended.
-fn patches_of(skin: &str) -> (Vec<String>, Option<i32>, String) {
-    let output = TACTOMO.run(&["live", "--skin", skin, "--seconds", "0.5", "--json"]);
+/// Names of the patches that a body's detectors were told by, in their order, and how it ended.
+fn patches_of(body: &str) -> (Vec<String>, Option<i32>, String) {
+    let output = TACTOMO.run(&["live", "--body", body, "--seconds", "0.5", "--json"]);
     let text = String::from_utf8(output.stdout).unwrap();
     let of = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap();
     let told = text.lines().map(of).filter(|line| line["frames"].as_u64() > Some(50));
@@ -371,10 +371,10 @@ fn patches_of(skin: &str) -> (Vec<String>, Option<i32>, String) {
 }
 
 #[test]
-fn the_detectors_of_a_skin_are_shown_each_by_its_name() {
-    let (names, code, messages) = patches_of(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml"));
+fn the_detectors_of_a_body_are_shown_each_by_its_name() {
+    let (names, code, messages) = patches_of(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/bodies/hand.toml"));
     assert_eq!((names.join(" "), code), ("index little middle ring thumb".to_owned(), Some(0)), "{messages}");
-    let (names, code, messages) = patches_of(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/gripper.toml"));
+    let (names, code, messages) = patches_of(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/bodies/gripper.toml"));
     assert_eq!((names.join(" "), code), ("left right".to_owned(), Some(0)), "{messages}");
 }
 
@@ -429,9 +429,9 @@ fn of_last(answers: &[serde_json::Value]) -> [f64; 3] {
 
 #[test]
 fn a_stream_of_several_detectors_names_each_and_keeps_the_order_of_its_times() {
-    let (folder, skin) = (Folder::new("several"), concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml"));
+    let (folder, body) = (Folder::new("several"), concat!(env!("CARGO_MANIFEST_DIR"), "/examples/bodies/hand.toml"));
     let stream = folder.path("hand.jsonl");
-    let output = TACTOMO.run(&["live", "--skin", skin, "--seconds", "2", "--json", "--stream", &stream]);
+    let output = TACTOMO.run(&["live", "--body", body, "--seconds", "2", "--json", "--stream", &stream]);
     assert_eq!(output.status.code(), Some(0));
     let text = std::fs::read_to_string(&stream).unwrap();
     let mut times = std::collections::BTreeMap::<String, Vec<f64>>::new();
@@ -482,19 +482,19 @@ fn of_a_folder_of_recordings_no_link_is_followed_and_nothing_acts() {
     let folder = Folder::new("foreign");
     let [taken, piece, out] = ["taken", "piece", "out.tactomo"].map(|name| folder.path(name));
     TACTOMO.succeeds(&["live", "--simulate", "2", "--seconds", "0.5", "--json", "--record", &taken]);
-    let skin = format!("{taken}/skin.toml");
-    let sound = std::fs::read_to_string(&skin).unwrap();
+    let body = format!("{taken}/body.toml");
+    let sound = std::fs::read_to_string(&body).unwrap();
     let acting = sound.replacen("[[patch]]", &format!("[[patch]]\nrecord = \"{out}\""), 1);
-    std::fs::write(&skin, acting).unwrap();
-    let refused = TACTOMO.refused(&["live", "--skin", &taken, "--seconds", "0.5", "--json"]);
+    std::fs::write(&body, acting).unwrap();
+    let refused = TACTOMO.refused(&["live", "--body", &taken, "--seconds", "0.5", "--json"]);
     assert!(refused.contains("patch board-1 of ") && refused.contains("\"record\""), "{refused}");
     assert!(!std::path::Path::new(&out).exists());
     let secret = folder.with("secret", &sound);
     let cut = ["recording", "cut", &taken, "--out", &piece];
-    std::fs::remove_file(&skin).unwrap();
-    symlink(&secret, &skin).unwrap();
+    std::fs::remove_file(&body).unwrap();
+    symlink(&secret, &body).unwrap();
     assert!(TACTOMO.refused(&cut).contains("it is a link"));
-    std::fs::remove_file(&skin).unwrap();
+    std::fs::remove_file(&body).unwrap();
     let recording = format!("{taken}/board-1.tactomo");
     std::fs::rename(&recording, &out).unwrap();
     symlink(&out, &recording).unwrap();
@@ -508,7 +508,7 @@ fn files_without_end_are_refused_by_their_formats_limit() {
     let zeros = "/dev/zero";
     let live = ["live", "--simulate", "--json", "--seconds", "0.5"];
     for (args, told) in [
-        (&["live", "--json", "--skin", zeros][..], "a skin's file"),
+        (&["live", "--json", "--body", zeros][..], "a body's file"),
         (&[&live[..], &["--jacobian", zeros]].concat(), "a Jacobian"),
         (&[&live[..], &["--learned", zeros]].concat(), "`tactomo-lab learn`"),
         (&["forward", "--touches", zeros], "a list of touches"),
@@ -552,25 +552,31 @@ fn a_table_is_checked_before_a_board_hears_of_it() {
 #[test]
 fn places_on_a_body_stay_with_a_folder_of_recordings() {
     let folder = Folder::new("body");
-    let [taken, piece, both, mcap] = ["taken", "piece", "both", "all.mcap"].map(|name| folder.path(name));
+    let [taken, piece, both, again, mcap] =
+        ["taken", "piece", "both", "again", "all.mcap"].map(|name| folder.path(name));
     let place = "place = { xyz_m = [0.1, 0.0, -0.02], rpy_rad = [0.0, 0.5, 0.0] }";
     let text =
         format!("[[patch]]\nname = \"left\"\nsimulate = true\n{place}\n[[patch]]\nname = \"right\"\nsimulate = true\n");
-    let skin = folder.with("body.toml", text);
+    let body = folder.with("body.toml", text);
     let runs = |args: &[&str]| {
         let output = TACTOMO.run(args);
         assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
     };
-    runs(&["live", "--skin", &skin, "--seconds", "0.5", "--json", "--record", &taken]);
+    runs(&["live", "--body", &body, "--seconds", "0.5", "--json", "--record", &taken]);
     runs(&["recording", "cut", &taken, "--to", "0.4", "--out", &piece]);
     runs(&["recording", "merge", &piece, &taken, "--out", &both]);
     runs(&["recording", "check", &both]);
-    let kept = std::fs::read_to_string(format!("{both}/skin.toml")).unwrap();
+    let kept = std::fs::read_to_string(format!("{both}/body.toml")).unwrap();
     assert!(
         kept.contains(&format!("replay = \"left.tactomo\"\n{place}\n")) && kept.matches("place").count() == 1,
         "{kept}"
     );
-    runs(&["live", "--skin", &both, "--seconds", "0.5", "--json", "--mcap", &mcap]);
+    runs(&["live", "--body", &both, "--seconds", "0.5", "--json", "--mcap", &mcap]);
+    // Folders and commands of before have another word.
+    std::fs::rename(format!("{both}/body.toml"), format!("{both}/skin.toml")).unwrap();
+    runs(&["recording", "cut", &both, "--out", &again]);
+    assert_eq!(std::fs::read_to_string(format!("{again}/body.toml")).unwrap(), kept);
+    runs(&["live", "--skin", &both, "--seconds", "0.5", "--json"]);
     let bytes = std::fs::read(&mcap).unwrap();
     let has = |text: &str| bytes.windows(text.len()).any(|at| at == text.as_bytes());
     assert!(has("/tactomo/left/tf") && has("foxglove.FrameTransform") && !has("/tactomo/right/tf"));
@@ -579,9 +585,9 @@ fn places_on_a_body_stay_with_a_folder_of_recordings() {
 
 #[test]
 fn a_patch_that_fails_is_named_and_harms_no_other() {
-    let folder = Folder::new("skin");
+    let folder = Folder::new("lame");
     let text = "[[patch]]\nname = \"lame\"\nport = \"/dev/null\"\n[[patch]]\nname = \"sound\"\nsimulate = true\n";
-    let (names, code, messages) = patches_of(&folder.with("skin.toml", text));
+    let (names, code, messages) = patches_of(&folder.with("body.toml", text));
     assert_eq!((names, code), (vec!["sound".to_owned()], Some(1)), "{messages}");
     assert!(messages.contains("patch lame") && messages.contains("/dev/null"), "{messages}");
     let (_, code, messages) = patches_of("no/such.toml");

@@ -69,7 +69,7 @@ pub enum RecordError {
     },
     /// A folder, perhaps of recordings.
     #[error(
-        "{path} is a folder, not a recording: name one of the recordings in it. `tactomo live --skin {path}` shows all of them together, \
+        "{path} is a folder, not a recording: name one of the recordings in it. `tactomo live --body {path}` shows all of them together, \
          `tactomo recording check {path}` tells how they are"
     )]
     Folder {

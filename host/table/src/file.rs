@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn what_never_ends_ends_with_the_limit_and_is_no_regular_file() {
         let zeros = Path::new("/dev/zero");
-        let error = Format::new("a skin", 1 << 20).read(zeros).unwrap_err();
+        let error = Format::new("a list of foams", 1 << 20).read(zeros).unwrap_err();
         assert!(error.to_string().contains("1 MiB"), "{error}");
         assert_eq!(check_regular(zeros).unwrap_err().kind(), ErrorKind::InvalidInput);
     }
