@@ -112,6 +112,14 @@ pub enum RecordError {
         /// What the system says.
         source: io::Error,
     },
+    /// The disk is full, or a quota is used up.
+    #[error(
+        "recording to {path} has stopped: the disk is full. What came before is kept in it; make room on the disk, or record to another one"
+    )]
+    Full {
+        /// The file.
+        path: PathBuf,
+    },
     /// The disk takes bytes more slowly than the board sends them.
     #[error(
         "recording to {path} has stopped: the disk is too slow, and {waiting_mb} MB wait to be written; the first {seconds:.1} s \

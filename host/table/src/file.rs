@@ -68,12 +68,12 @@ fn size(bytes: u64) -> String {
     if bytes >= 1 << 20 { format!("{} MiB", bytes >> 20) } else { format!("{bytes} bytes") }
 }
 
-/// Checks a path that a file names, rather than a person: a pipe would be waited for, and a device has no end.
+/// Checks the path of what is read piece by piece, or what another file names: a pipe would be waited for, and a device has no end.
 ///
 /// # Errors
 /// What the system says; [`ErrorKind::InvalidInput`] if it is no regular file, nor a link to one.
 pub fn check_regular(path: &Path) -> io::Result<()> {
-    let not_regular = || io::Error::new(ErrorKind::InvalidInput, "it is no regular file");
+    let not_regular = || io::Error::new(ErrorKind::InvalidInput, "it is no regular file: copy what it gives into one");
     fs::metadata(path)?.is_file().then_some(()).ok_or_else(not_regular)
 }
 
