@@ -35,8 +35,8 @@ BOARDS = {
 MOST_GAINED_MB = 12
 
 
-def skin(port: str) -> str:
-    """The skin's file."""
+def body(port: str) -> str:
+    """The body's file."""
     patches = [f'[[patch]]\nname = "{name}"\nsimulate = true\nseed = {seed}\n' + "".join(f"{key} = {json.dumps(value)}\n" for key, value in options.items()) for seed, (name, options) in enumerate(BOARDS.items())]
     return "\n".join([*patches, f'[[patch]]\nname = "unplugged"\nport = "{port}"\n'])
 
@@ -123,11 +123,11 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         nonsense = Nonsense(folder / "port")
-        (folder / "skin.toml").write_text(skin(str(nonsense.link)))
+        (folder / "body.toml").write_text(body(str(nonsense.link)))
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]
-        arguments = ["live", "--skin", str(folder / "skin.toml"), "--seconds", str(seconds), "--json", "--record", str(folder / "kept"), "--stream", str(folder / "lines"), "--stream", f"tcp:{port}", "--stream-hz", "50"]
+        arguments = ["live", "--body", str(folder / "body.toml"), "--seconds", str(seconds), "--json", "--record", str(folder / "kept"), "--stream", str(folder / "lines"), "--stream", f"tcp:{port}", "--stream-hz", "50"]
         disk = folder / "disk"
         disk.mkdir()
         has_disk = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "soak", str(disk)], capture_output=True).returncode == 0

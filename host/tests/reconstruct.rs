@@ -319,7 +319,7 @@ fn a_kernel_learns_from_presses_on_any_channels() {
         })
         .collect();
     let presses = folder.with("presses.csv", format!("x_m,y_m,force_n,a,b,c\n{taught}"));
-    let file = folder.with("skin.csv", csv(&[heard(0.4, 0.6, 1.5).to_vec()]));
+    let file = folder.with("sensor.csv", csv(&[heard(0.4, 0.6, 1.5).to_vec()]));
     let found = lines(&[&file, "--presses", &presses]);
     let contact = &found[0]["contacts"][0];
     for (key, truth) in [("x_m", 0.4), ("y_m", 0.6), ("force_n", 1.5)] {

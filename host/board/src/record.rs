@@ -69,7 +69,7 @@ pub enum RecordError {
     },
     /// A folder, perhaps of recordings.
     #[error(
-        "{path} is a folder, not a recording: name one of the recordings in it. `tactomo live --skin {path}` shows all of them together, \
+        "{path} is a folder, not a recording: name one of the recordings in it. `tactomo live --body {path}` shows all of them together, \
          `tactomo recording check {path}` tells how they are"
     )]
     Folder {
@@ -111,6 +111,14 @@ pub enum RecordError {
         path: PathBuf,
         /// What the system says.
         source: io::Error,
+    },
+    /// The disk is full, or a quota is used up.
+    #[error(
+        "recording to {path} has stopped: the disk is full. What came before is kept in it; make room on the disk, or record to another one"
+    )]
+    Full {
+        /// The file.
+        path: PathBuf,
     },
     /// The disk takes bytes more slowly than the board sends them.
     #[error(

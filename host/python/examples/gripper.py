@@ -1,8 +1,8 @@
 """Two fingers that feel an object slip and grip it firmer: a control loop over nothing but the stream of contacts.
 
     python gripper.py                 # a cup is filled between two simulated fingers, with the loop and without it
-    tactomo live --skin host/examples/skins/gripper.toml --no-open --stream - | python gripper.py -
-                                      # the same loop on two boards, or whatever the skin has: your gripper's command goes where it prints
+    tactomo live --body host/examples/bodies/gripper.toml --no-open --stream - | python gripper.py -
+                                      # the same loop on two boards, or whatever the body has: your gripper's command goes where it prints
 
 The loop is `Grip`: it takes lines of `--stream` and gives the force to grip with (N). A finger slips where its contact moves faster than chance, in
 standard errors of the speed; both have to agree. What slips must have an edge or a curve to it: a smooth wall wider than the pad moves no contact.

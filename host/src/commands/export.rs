@@ -17,10 +17,10 @@ use tactomo::sink::place::Place;
 use tactomo::solve::{Lambda, Method};
 
 use self::answers::{Answer, Answers, Recording};
-use super::live::skin::{self, Patch};
+use super::live::body::{self, Patch};
 use super::reconstruct::reader::Input;
 use super::reconstruct::writer::{FileForm, Writer};
-use super::recording::folder::{self, SKIN};
+use super::recording::folder;
 use super::streams::Streamed;
 use tactomo_cli::choice::{self, DetectorArgs, Model};
 use tactomo_cli::interrupt;
@@ -184,13 +184,13 @@ impl Args {
         Ok(files)
     }
 
-    /// Where the detectors of a folder lie on a body, by name, as far as its skin's file tells.
+    /// Where the detectors of a folder lie on a body, by name, as far as it tells.
     fn places(&self) -> anyhow::Result<Vec<(String, Place)>> {
-        if self.file.join(SKIN).symlink_metadata().is_err() {
+        if folder::body(&self.file).symlink_metadata().is_err() {
             return Ok(Vec::new());
         }
         let placed = |Patch { name, place, .. }| Some((name, place?));
-        Ok(skin::read(&self.file)?.into_iter().filter_map(placed).collect())
+        Ok(body::read(&self.file)?.into_iter().filter_map(placed).collect())
     }
 
     fn input<'a>(&'a self, file: &'a Path) -> Input<'a> {

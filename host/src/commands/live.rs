@@ -1,7 +1,7 @@
 //! `tactomo live`: the live picture.
 
+pub mod body;
 mod several;
-pub mod skin;
 mod together;
 
 use std::io::IsTerminal;
@@ -28,7 +28,7 @@ use tactomo::sink::page::{Finger, Listen, Server, Shown, code};
 use tactomo::sink::place::Place;
 use tactomo::solve::{Method, Problem};
 
-use self::skin::Patch;
+use self::body::Patch;
 use super::source::{self, BoardArgs};
 use super::streams::StreamArgs;
 use super::{browser, keep};
@@ -61,7 +61,7 @@ const PORT: &str = "Serial port of the board, or the serial number of its USB de
 ///   tactomo live --stream - --stream-hz 100 | python robot.py
 ///   tactomo live --foxglove --mcap touch.mcap       for Foxglove, live and afterwards
 ///   tactomo live --simulate 5                       five boards on one page
-///   tactomo live --skin hand.toml                   several detectors, each with its board, on one page
+///   tactomo live --body hand.toml                   several detectors, each with its board, on one page
 #[derive(Clone, Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 #[command(mut_arg("simulate", |arg| arg.num_args(0..=1).help(SIMULATE)))]
@@ -69,8 +69,8 @@ const PORT: &str = "Serial port of the board, or the serial number of its USB de
 pub struct Args {
     /// Shows several detectors, each with its board, on one page: a TOML file with a [[patch]] for each, that has a name and options of this
     /// command; or a folder of recordings of several
-    #[arg(long, value_name = "FILE", conflicts_with_all = skin::OF_ONE)]
-    pub skin: Option<PathBuf>,
+    #[arg(long, alias = "skin", value_name = "FILE|FOLDER", conflicts_with_all = body::OF_ONE)]
+    pub body: Option<PathBuf>,
     #[command(flatten)]
     pub board: BoardArgs,
     /// Plays a recording instead
@@ -92,7 +92,7 @@ pub struct Args {
     /// Ends this many seconds after the board said Hello
     #[arg(long, value_parser = options::seconds)]
     pub seconds: Option<Duration>,
-    /// Keeps all bytes that come in a new file; of several boards in a new folder, with a file for each, which --skin FOLDER shows again
+    /// Keeps all bytes that come in a new file; of several boards in a new folder, with a file for each, which --body FOLDER shows again
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
     #[command(flatten)]

@@ -32,7 +32,7 @@ use tactomo_cli::output::message;
 ///   tactomo reconstruct readings.csv --unit mV --detector square-60 --solver tikhonov --lambda gcv
 ///   tactomo reconstruct readings.npz --rest 10 --out contacts.csv
 ///   tactomo reconstruct touch.tactomo --solver tikhonov --images --out images.npz
-///   tactomo reconstruct skin.csv --learned skin.safetensors --json
+///   tactomo reconstruct touch.csv --learned mine.safetensors --json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {

@@ -89,6 +89,8 @@ pub struct Snapshot {
     pub calibrated: Option<Arc<Detector>>,
     /// What was learned of the detector while it was used, if that is in use.
     pub learned: Option<LearnedInUse>,
+    /// The file that was taken from, if a run before has kept it.
+    pub learned_from: Option<PathBuf>,
     /// What was asked for and cannot be, for the person who asked.
     pub refused: Refusals,
     /// What to know of the baseline, as one sentence for a person; none if all is well.

@@ -68,12 +68,12 @@ fn size(bytes: u64) -> String {
     if bytes >= 1 << 20 { format!("{} MiB", bytes >> 20) } else { format!("{bytes} bytes") }
 }
 
-/// Checks a path that a file names, rather than a person: a pipe would be waited for, and a device has no end.
+/// Checks the path of what is read piece by piece, or what another file names: a pipe would be waited for, and a device has no end.
 ///
 /// # Errors
 /// What the system says; [`ErrorKind::InvalidInput`] if it is no regular file, nor a link to one.
 pub fn check_regular(path: &Path) -> io::Result<()> {
-    let not_regular = || io::Error::new(ErrorKind::InvalidInput, "it is no regular file");
+    let not_regular = || io::Error::new(ErrorKind::InvalidInput, "it is no regular file: copy what it gives into one");
     fs::metadata(path)?.is_file().then_some(()).ok_or_else(not_regular)
 }
 
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn what_never_ends_ends_with_the_limit_and_is_no_regular_file() {
         let zeros = Path::new("/dev/zero");
-        let error = Format::new("a skin", 1 << 20).read(zeros).unwrap_err();
+        let error = Format::new("a list of foams", 1 << 20).read(zeros).unwrap_err();
         assert!(error.to_string().contains("1 MiB"), "{error}");
         assert_eq!(check_regular(zeros).unwrap_err().kind(), ErrorKind::InvalidInput);
     }

@@ -30,11 +30,11 @@ fn a_folder_of_recordings_is_one_file_with_the_topics_that_live_writes() {
     let folder = Folder::new("streams-folder");
     let [taken, live, all, ros, lines] =
         ["taken", "live.mcap", "all.mcap", "ros2.mcap", "all.jsonl"].map(|name| folder.path(name));
-    let skin = folder.path("skin.toml");
+    let body = folder.path("body.toml");
     let patch = |name: &str| format!("[[patch]]\nname = \"{name}\"\nsimulate = true\nscene = \"single\"\n");
     let place = "place = { xyz_m = [0.1, 0.0, 0.0], rpy_rad = [0.0, 0.0, 0.0] }\n";
-    std::fs::write(&skin, patch("board-1") + place + &patch("board-2")).unwrap();
-    let boards = ["live", "--skin", &skin, "--seconds", "2", "--json"];
+    std::fs::write(&body, patch("board-1") + place + &patch("board-2")).unwrap();
+    let boards = ["live", "--body", &body, "--seconds", "2", "--json"];
     TACTOMO.succeeds(&[&boards[..], &["--record", &taken, "--mcap", &live]].concat());
     let export = ["export", &taken, "--solver", "contacts", "--to"];
     TACTOMO.succeeds(&[&export[..], &["mcap", "--out", &all]].concat());

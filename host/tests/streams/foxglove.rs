@@ -121,8 +121,8 @@ fn an_app_sees_the_channels_and_gets_those_that_it_subscribes_to() {
 
 #[test]
 fn an_app_is_told_once_a_second_where_detectors_are_on_a_body() {
-    let skin = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml");
-    let mut live = Live::of(&["--skin", skin, "--json", "--foxglove", "0", "--seconds", "60"]);
+    let body = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/bodies/hand.toml");
+    let mut live = Live::of(&["--body", body, "--json", "--foxglove", "0", "--seconds", "60"]);
     let (mut socket, _) = connect(&live.told("open ws://"), "foxglove.websocket.v1").unwrap();
     let _info = json(&mut socket);
     let advertised = json(&mut socket);

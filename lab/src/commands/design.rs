@@ -9,7 +9,7 @@ use clap::builder::TypedValueParser;
 use tactomo_board::inputs::{self, Settling};
 use tactomo_board::simulated::BoardModel;
 use tactomo_design::search::{self, Board, Material, Plan, Wishes};
-use tactomo_physics::detector::{Adc, Chosen, Detector, Stack};
+use tactomo_physics::detector::{Adc, Chosen, Detector, LENGTH_M, Stack};
 use tactomo_study::view::{self, View};
 
 use super::shown::watched;
@@ -104,11 +104,10 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let sides: Option<Vec<f64>> = text.split('x').map(|side| side.trim().parse().ok()).collect();
-        match sides.as_deref() {
-            Some([width_mm, height_mm]) => Ok(Self([width_mm * 1e-3, height_mm * 1e-3])),
-            _ => Err("width and height in millimetres are needed, as in 60x60".to_owned()),
-        }
+        let sides = text.split_once('x').ok_or("width and height in millimetres are needed, as in 60x60")?;
+        let range_mm = 1e3 * LENGTH_M.start()..=1e3 * LENGTH_M.end();
+        let side_m = |side: &str| options::number_in(side, "a side (mm)", &range_mm).map(|side_mm| 1e-3 * side_mm);
+        Ok(Self([side_m(sides.0)?, side_m(sides.1)?]))
     }
 }
 

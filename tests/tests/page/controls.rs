@@ -127,6 +127,24 @@ fn the_board_card_says_which_rows_are_scanned() -> Result<()> {
 }
 
 #[test]
+fn the_board_card_names_the_file_that_was_learned_before() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
+        let shown = "return [...document.querySelectorAll('#details dt')].find((term) => term.textContent === 'Detector').nextSibling.textContent";
+        for (from, ending) in [
+            (None, "16 electrodes"),
+            (Some("/home/me/my.A7.learned.toml"), "16 electrodes, as learned in my.A7.learned.toml"),
+            (None, "16 electrodes"),
+        ] {
+            stage.behind.set(|snapshot| {
+                (snapshot.hello, snapshot.learned_from) = (Some(hello()), from.map(Into::into));
+            });
+            stage.browser.shows(shown, |shown| shown.as_str().is_some_and(|text| text.ends_with(ending))).await?;
+        }
+        Ok(())
+    })
+}
+
+#[test]
 fn recording_is_asked_for_and_its_file_shown() -> Result<()> {
     in_front_of(Script::start, async |stage| {
         stage.browser.click("record").await?;

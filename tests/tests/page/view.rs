@@ -379,7 +379,7 @@ fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
         let is_told =
             |shown: &Value| shown.as_str().is_some_and(|s| s.starts_with("unexplained 1.0 × noise · answer "));
         stage.browser.shows(residual, is_told).await?;
-        let another = "my-skin was calibrated on another board.";
+        let another = "my-sensor was calibrated on another board.";
         stage.behind.set(|snapshot| (snapshot.baseline, snapshot.calibration) = (None, Some(another.to_owned())));
         stage.browser.says("notice-text", another).await?;
         ensure!(stage.browser.run("return document.getElementById('notice').className").await? == "warning");

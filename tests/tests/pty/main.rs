@@ -5,6 +5,7 @@
 mod board;
 mod first_look;
 mod host;
+mod learned;
 
 use std::thread;
 use std::time::{Duration, Instant};

@@ -17,7 +17,7 @@ use crate::baseline::BaselineTracker;
 use crate::clock::Delay;
 use crate::record::{self, OtherProtocol, RecordError};
 use tactomo_physics::readings::{Readings, Says};
-use tactomo_table::{Array, Table, TableError};
+use tactomo_table::{Array, Table, TableError, file};
 
 /// Names that an array of readings may have in an NPZ file.
 const READINGS: [&str; 3] = ["readings_v", "readings", "volts"];
@@ -201,6 +201,8 @@ impl FrameFile {
         expected: Option<usize>,
         readings: impl FnOnce(Table) -> Result<Array, String>,
     ) -> Result<Self, FramesError> {
+        // Which of the two it is has to be read before it is read.
+        file::check_regular(path).map_err(|source| TableError::Read { path: path.to_owned(), source })?;
         if is_recording(path) {
             return Ok(Self::Recording(Box::new(Recorded::open(path)?)));
         }

@@ -10,6 +10,7 @@ use super::scan::{find_whole, is_one_chunk, parse};
 use super::start::{Opened, Refused};
 use super::window::Window;
 use super::{Header, Loss, Note, RecordError};
+use tactomo_table::file;
 
 /// Bytes at the end in which the last chunk is looked for first: four of the longest.
 const LAST_BYTES: u64 = 4 * (MAX_CHUNK + MAX_OVERHEAD) as u64;
@@ -44,11 +45,11 @@ impl RecordReader<File> {
     /// [`RecordError`] if the file is not there, or no recording that this program reads.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
         let open = |source| RecordError::Open { path: path.to_owned(), source };
-        let file = File::open(path).map_err(open)?;
-        if file.metadata().map_err(open)?.is_dir() {
+        if path.is_dir() {
             return Err(RecordError::Folder { path: path.to_owned() });
         }
-        Self::new(file, path)
+        let file = file::check_regular(path).and_then(|()| File::open(path));
+        Self::new(file.map_err(open)?, path)
     }
 }
 

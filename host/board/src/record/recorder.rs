@@ -1,6 +1,6 @@
 //! Keeps a recording while it is made, off the thread that receives.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -148,7 +148,7 @@ impl Recorder {
     /// Adds bytes that came at `arrived`; never waits.
     ///
     /// # Errors
-    /// [`RecordError::Write`] if the file takes no more, [`RecordError::TooSlow`] if 256 MB wait for the disk. What came before is
+    /// [`RecordError::Full`] or [`RecordError::Write`] if the file takes no more, [`RecordError::TooSlow`] if 256 MB wait for the disk. What came before is
     /// kept; nothing more is taken.
     pub fn push(&mut self, bytes: &[u8], arrived: Instant) -> Result<(), RecordError> {
         let bytes = self.first.rest(bytes);
@@ -207,7 +207,7 @@ impl Recorder {
     /// Writes what is left and closes the file.
     ///
     /// # Errors
-    /// [`RecordError::Write`] if not everything could be kept.
+    /// [`RecordError::Full`] or [`RecordError::Write`] if not everything could be kept.
     pub fn finish(self) -> Result<(), RecordError> {
         self.close().wait()
     }
@@ -232,7 +232,7 @@ impl Closing {
     /// Waits until all is written.
     ///
     /// # Errors
-    /// [`RecordError::Write`] if not everything could be kept.
+    /// [`RecordError::Full`] or [`RecordError::Write`] if not everything could be kept.
     pub fn wait(self) -> Result<(), RecordError> {
         outcome(&self.path, self.writer)
     }
@@ -252,7 +252,13 @@ fn outcome(path: &Path, writer: Option<JoinHandle<io::Result<Kept>>>) -> Result<
             drop(std::fs::remove_file(path));
             Ok(())
         }
-        Err(source) => Err(RecordError::Write { path: path.to_owned(), source }),
+        Err(source) => {
+            let path = path.to_owned();
+            Err(match source.kind() {
+                ErrorKind::StorageFull | ErrorKind::QuotaExceeded => RecordError::Full { path },
+                _ => RecordError::Write { path, source },
+            })
+        }
     }
 }
 
@@ -378,7 +384,7 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn a_full_disk_is_an_error() {
+    fn a_full_disk_is_told_with_what_is_kept_and_what_to_do() {
         let full = std::fs::File::create("/dev/full").unwrap();
         let writer = RecordWriter { out: BufWriter::new(full), chunk: Vec::new() };
         let mut recorder =
@@ -388,8 +394,8 @@ mod tests {
                 break error;
             }
         };
-        let RecordError::Write { source, .. } = &error else { panic!("{error:?}") };
-        assert!(error.to_string().contains("what came before is kept") && !source.to_string().is_empty(), "{error}");
+        let told = "recording to full has stopped: the disk is full. What came before is kept in it; make room on the disk, or record to another one";
+        assert_eq!(error.to_string(), told);
         assert!(recorder.push(b"more", Instant::now()).is_err());
     }
 

@@ -11,9 +11,10 @@ use crate::space::{self, Place};
 
 /// How many electrodes a detector may have.
 pub const ELECTRODES: RangeInclusive<usize> = 4..=32;
-/// Lengths (m).
-pub(super) const LENGTH_M: RangeInclusive<f64> = 1e-6..=10.0;
-const CONDUCTIVITY_S_PER_M: RangeInclusive<f64> = 1e-9..=1e9;
+/// Sides, thicknesses and diameters of detectors (m).
+pub const LENGTH_M: RangeInclusive<f64> = 1e-6..=10.0;
+/// Conductivities of layers (S/m).
+pub const CONDUCTIVITY_S_PER_M: RangeInclusive<f64> = 1e-9..=1e9;
 /// Contact impedances that a pad may have (ohm m2).
 const IMPEDANCE_OHM_M2: RangeInclusive<f64> = 0.0..=1e3;
 /// Amplitudes of unevenness, as logarithms: a factor of e.

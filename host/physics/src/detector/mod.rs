@@ -19,7 +19,7 @@ mod uneven;
 pub use self::bond::Bond;
 pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
 pub(crate) use self::check::within;
-pub use self::check::{ELECTRODES, Problem};
+pub use self::check::{CONDUCTIVITY_S_PER_M, ELECTRODES, LENGTH_M, Problem};
 pub use self::chosen::{Chosen, UnknownDetector};
 pub use self::correction::{ConductanceErrors, Correction, PlaceErrors};
 pub use self::file::{FileError, TomlError};

@@ -10,7 +10,7 @@ pub use self::demonstration::TEXTURE_HZ;
 pub use self::hand::{Fingertip, Hand};
 pub use self::name::SceneName;
 pub use self::script::Scene;
-pub use self::touch::{Shape, Touch, TouchError};
+pub use self::touch::{CONDUCTANCE_S, Shape, Touch, TouchError};
 
 /// A disc of contact between driving layer and detector.
 ///

@@ -4,12 +4,11 @@ use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
 use super::Contact;
+use crate::detector::LENGTH_M;
 use crate::geometry::{self, Point};
 
 /// Conductances of a touch (S): from an insulator's to a bar of copper's.
-const CONDUCTANCE_S: RangeInclusive<f64> = 1e-12..=1e6;
-/// Lengths of a touch (m), as of a detector.
-const LENGTH_M: RangeInclusive<f64> = 1e-6..=10.0;
+pub const CONDUCTANCE_S: RangeInclusive<f64> = 1e-12..=1e6;
 /// Farthest from the middle of a detector (m).
 const FAR_M: f64 = 10.0;
 

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, bail, ensure};
 use tactomo::detector::Detector;
+use tactomo::hertz::FORCE_N;
 use tactomo::table::Table;
 
 /// How near in time a frame of a recording has to be to a known press (s).
@@ -77,12 +78,13 @@ pub fn places_or_order(path: &Path, is_time: bool) -> anyhow::Result<(Vec<KnownP
             at_m: [row[x], row[y]],
             force_n: force.map(|force| row[force]).filter(|force_n| !force_n.is_nan()),
         };
-        let numbers = [known.at, known.at_m[0], known.at_m[1], known.force_n.unwrap_or(1.0)];
-        let is_pressed = known.force_n.is_none_or(|force_n| force_n > 0.0);
+        let is_pressed = known.force_n.is_none_or(|force_n| FORCE_N.contains(&force_n));
         ensure!(
-            is_pressed && numbers.iter().all(|number| number.is_finite()),
-            "{file}, row {}: places have to be finite numbers, and forces above zero",
-            index + 1
+            is_pressed && [known.at, known.at_m[0], known.at_m[1]].iter().all(|number| number.is_finite()),
+            "{file}, row {}: places have to be finite numbers, and forces from {:?} to {:?} N",
+            index + 1,
+            FORCE_N.start(),
+            FORCE_N.end()
         );
         Ok(known)
     };

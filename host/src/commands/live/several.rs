@@ -1,4 +1,4 @@
-//! Several detectors, each with its board, shown together: of a skin's file, on ports that are named, or simulated.
+//! Several detectors, each with its board, shown together: of a body's file, on ports that are named, or simulated.
 
 use std::fs;
 use std::path::Path;
@@ -7,17 +7,17 @@ use anyhow::{Context, ensure};
 use tactomo::board::identity::port_label;
 
 use super::Args;
-use super::skin::{self, Patch};
-use crate::commands::recording::folder::{self, EXTENSION, SKIN};
+use super::body::{self, Patch};
+use crate::commands::recording::folder::{self, BODY, EXTENSION};
 use crate::commands::streams::StreamArgs;
 
 /// The detectors to show; `None` if it is one.
 ///
 /// # Errors
-/// If the skin is none, or they cannot be recorded.
+/// If the body is none, or they cannot be recorded.
 pub fn detectors(args: &Args) -> anyhow::Result<Option<Vec<Patch>>> {
-    let mut all = match &args.skin {
-        Some(path) => skin::read(path)?,
+    let mut all = match &args.body {
+        Some(path) => body::read(path)?,
         None if args.board.boards() > 1 => boards(args)?,
         None => return Ok(None),
     };
@@ -42,12 +42,12 @@ fn boards(args: &Args) -> anyhow::Result<Vec<Patch>> {
         Patch { name: port_label(port), place: None, args: board }
     };
     let count = args.board.ports.len();
-    ensure!(count <= skin::MOST, "{count} ports are given, and {} boards can be shown together", skin::MOST);
+    ensure!(count <= body::MOST, "{count} ports are given, and {} boards can be shown together", body::MOST);
     let ports = args.board.ports.iter().map(on_port);
     let all: Vec<_> = (0..args.board.simulate.unwrap_or(0)).map(simulated).chain(ports).collect();
     for (i, Patch { name, .. }) in all.iter().enumerate() {
         let is_new = all[..i].iter().all(|other| other.name != *name);
-        ensure!(is_new, "two boards would be called {name}: name each port once, or give them names with --skin");
+        ensure!(is_new, "two boards would be called {name}: name each port once, or give them names with --body");
     }
     Ok(all)
 }
@@ -55,13 +55,13 @@ fn boards(args: &Args) -> anyhow::Result<Vec<Patch>> {
 /// Has each of them recorded in a folder, which can be shown again as it is.
 fn record(all: &mut [Patch], folder: &Path) -> anyhow::Result<()> {
     folder::make(folder).context("the recordings of all go into a new folder")?;
-    let mut skin = String::new();
+    let mut body = String::new();
     for Patch { name, place, args } in all.iter_mut().filter(|patch| patch.args.replay.is_none()) {
         let file = format!("{name}.{EXTENSION}");
         args.record.get_or_insert_with(|| folder.join(&file));
         let place = place.map_or_else(String::new, |place| format!("place = {place}\n"));
-        skin += &format!("[[patch]]\nname = \"{name}\"\nreplay = \"{file}\"\n{place}\n");
+        body += &format!("[[patch]]\nname = \"{name}\"\nreplay = \"{file}\"\n{place}\n");
     }
-    let path = folder.join(SKIN);
-    fs::write(&path, skin).with_context(|| format!("cannot write {}", path.display()))
+    let path = folder.join(BODY);
+    fs::write(&path, body).with_context(|| format!("cannot write {}", path.display()))
 }

@@ -9,12 +9,21 @@ use anyhow::{Context, ensure};
 use tactomo::board::record::{RecordReader, edit};
 use tactomo::new_file::NewFileError;
 
-use crate::commands::live::skin;
+use crate::commands::live::body::FORMAT;
 
 /// What a recording's file ends in.
 pub const EXTENSION: &str = "tactomo";
-/// The file in a folder of recordings by which `live --skin` shows them together.
-pub const SKIN: &str = "skin.toml";
+/// The file in a folder of recordings by which `live --body` shows them together.
+pub const BODY: &str = "body.toml";
+/// What that file was called before.
+const BODY_BEFORE: &str = "skin.toml";
+
+/// The file in a folder by which its recordings are shown together, whether it is there or not.
+pub fn body(folder: &Path) -> PathBuf {
+    let [body, before] = [BODY, BODY_BEFORE].map(|name| folder.join(name));
+    let is_there = |path: &Path| path.symlink_metadata().is_ok();
+    if is_there(&before) && !is_there(&body) { before } else { body }
+}
 
 /// The files that are meant: of folders, the recordings in them.
 pub fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
@@ -100,15 +109,15 @@ pub fn make(folder: &Path) -> Result<(), NewFileError> {
 
 /// Makes a folder for recordings that are shown together as those of `like` are.
 fn begin(like: &Path, out: &Path) -> anyhow::Result<()> {
-    let skin = like.join(SKIN);
-    let read = || check_own(&skin).and_then(|()| skin::FORMAT.read_text(&skin));
+    let from = body(like);
+    let read = || check_own(&from).and_then(|()| FORMAT.read_text(&from));
     let text = match read() {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-        read => Some(read.with_context(|| format!("cannot copy {}", skin.display()))?),
+        read => Some(read.with_context(|| format!("cannot copy {}", from.display()))?),
     };
     make(out)?;
     if let Some(text) = text {
-        let to = out.join(SKIN);
+        let to = out.join(BODY);
         fs::write(&to, text).with_context(|| format!("cannot write {}", to.display()))?;
     }
     Ok(())

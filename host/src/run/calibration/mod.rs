@@ -124,12 +124,25 @@ pub(super) struct Calibration {
     used: Option<Arc<Detector>>,
     /// What was learned unasked, if that is the one.
     learned: Option<LearnedInUse>,
+    /// The file that was taken from, if a run before has kept it.
+    learned_from: Option<PathBuf>,
 }
 
 impl Calibration {
     /// None yet; what comes of them in other threads goes through `inbox`.
     pub fn new(inbox: Arc<Inbox>, notice: Arc<NoticeBoard>, folder: PathBuf, learning: Option<Learning>) -> Self {
-        Self { inbox, notice, folder, learning, sensor: None, session: None, begun: 0, used: None, learned: None }
+        Self {
+            inbox,
+            notice,
+            folder,
+            learning,
+            sensor: None,
+            session: None,
+            begun: 0,
+            used: None,
+            learned: None,
+            learned_from: None,
+        }
     }
 
     /// Begins with a board's detector: frames before were those of another, or of other settings of its converter.
@@ -159,6 +172,7 @@ impl Calibration {
         if before.is_some() {
             // Presses so far were on another.
             let was_learned = self.learned.take().is_some();
+            self.learned_from = None;
             self.used.take_if(|_| was_learned);
             self.begin_with(Arc::clone(&description));
             if was_learned && kept.is_none() {
@@ -169,6 +183,7 @@ impl Calibration {
         tracing::info!("what was learned before of this sensor is used: {}", file.display());
         let used = Arc::new(detector.measured_as(&description));
         (self.learned, self.used) = (detector.calibration.as_ref().map(LearnedInUse::of), Some(Arc::clone(&used)));
+        self.learned_from = Some(file);
         self.session.iter_mut().for_each(|session| session.set_used(self.used.clone()));
         Meeting::Known(used)
     }
@@ -190,7 +205,7 @@ impl Calibration {
     /// Remembers what is to be used from now on.
     fn chosen(&mut self, found: &Rub, learned: Option<LearnedInUse>) -> Arc<Detector> {
         let used = Arc::new(found.detector.clone());
-        (self.used, self.learned) = (Some(Arc::clone(&used)), learned);
+        (self.used, self.learned, self.learned_from) = (Some(Arc::clone(&used)), learned, None);
         self.session.iter_mut().for_each(|session| session.set_used(self.used.clone()));
         used
     }
@@ -211,8 +226,8 @@ impl Calibration {
 
     /// Shows what was learned, once there is a solver for it.
     pub fn show_learned(&mut self) {
-        let learned = self.learned;
-        self.notice.change(|snapshot| snapshot.learned = learned);
+        let (learned, from) = (self.learned, self.learned_from.clone());
+        self.notice.change(|snapshot| (snapshot.learned, snapshot.learned_from) = (learned, from));
     }
 
     /// Takes the newest frame, or the rows that came, and the contacts found in it: less the baseline, as the channels read them.

@@ -9,6 +9,8 @@
 //!
 //! Page to program, JSON: see [`messages`](super::messages).
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 use tactomo_protocol::Hello;
 
@@ -38,6 +40,8 @@ struct StatusMessage<'a> {
     calibration: Option<&'a str>,
     /// What was learned of the detector, as a part of a sentence.
     learned: Option<String>,
+    /// The name of the file that was taken from.
+    learned_from: Option<Cow<'a, str>>,
     calibrating: Option<CalibratingMessage<'a>>,
 }
 
@@ -156,6 +160,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         wires: snapshot.wires,
         calibration: snapshot.calibration.as_deref(),
         learned: snapshot.learned.map(|learned| learned.to_string()),
+        learned_from: snapshot.learned_from.as_ref().and_then(|file| Some(file.file_name()?.to_string_lossy())),
         calibrating: snapshot.calibrating.as_deref().map(CalibratingMessage::of),
     })
 }

@@ -21,6 +21,8 @@ mod skin;
 mod tests;
 
 use tactomo_physics::detector::{FARTHEST, ForceLaw, Problem};
+use tactomo_physics::hertz::FORCE_N;
+use tactomo_physics::scene::CONDUCTANCE_S;
 
 use self::fit::{Fitted, Form, Known, Point};
 pub use self::order::Mistyped;
@@ -267,14 +269,21 @@ fn parameters(best: &Fitted) -> Vec<FittedParameter> {
 }
 
 fn check(presses: &[ForcePress]) -> Result<(), ForceError> {
-    let is_good = |value: f64| value > 0.0 && value.is_finite();
     for (index, press) in presses.iter().enumerate() {
         let wrong = |what: String| Err(ForceError::Value { press: index, what });
-        if !is_good(press.force_n) {
-            return wrong(format!("its force is {} N, but has to be above zero", press.force_n));
+        for (what, value, unit, range) in
+            [("force", press.force_n, "N", FORCE_N), ("conductance", press.conductance_s, "S", CONDUCTANCE_S)]
+        {
+            if !range.contains(&value) {
+                let (low, high) = (range.start(), range.end());
+                return wrong(format!("its {what} is {value:?} {unit}, but has to be from {low:?} to {high:?} {unit}"));
+            }
         }
-        if !(is_good(press.conductance_s) && press.deviation_s >= 0.0) {
-            return wrong(format!("its conductance is {} S, but has to be above zero", press.conductance_s));
+        if !(0.0..=*CONDUCTANCE_S.end()).contains(&press.deviation_s) {
+            return wrong(format!(
+                "its conductance's deviation is {:?} S, but has to be zero or more",
+                press.deviation_s
+            ));
         }
     }
     if presses.len() < FEWEST {

@@ -2,17 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use tactomo_physics::detector::FOAMS;
+use tactomo_physics::detector::{CONDUCTIVITY_S_PER_M, FOAMS, LENGTH_M};
+use tactomo_physics::hertz::YOUNG_PA;
 use tactomo_table::file::Format;
 
 /// A list of foams.
 const FORMAT: Format = Format::new("a list of foams", 1 << 20);
 /// Thicknesses that foams are taken to be sold in unless their list says otherwise (m).
 const THICKNESSES_M: [f64; 6] = [0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3, 10e-3];
-/// What a detector's file allows (S/m), and what is still a foam (Pa).
-const CONDUCTIVITY_S_PER_M: [f64; 2] = [1e-9, 1e9];
-const ELASTICITY_PA: [f64; 2] = [1e2, 1e12];
-const THICKNESS_M: [f64; 2] = [1e-6, 1.0];
 
 /// A foam that can be had.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -115,12 +112,13 @@ impl Material {
             }
             let numbers = [
                 ("conductivity_s_per_m", foam.conductivity_s_per_m, CONDUCTIVITY_S_PER_M),
-                ("elasticity_pa", foam.elasticity_pa, ELASTICITY_PA),
+                ("elasticity_pa", foam.elasticity_pa, YOUNG_PA),
             ];
-            let thicknesses = foam.thicknesses_m.iter().map(|thickness_m| ("thicknesses_m", *thickness_m, THICKNESS_M));
-            for (field, value, [low, high]) in numbers.into_iter().chain(thicknesses) {
-                if !(low..=high).contains(&value) {
-                    return wrong(&foam.name, format!("{field} is {value}; it has to be from {low:e} to {high:e}"));
+            let thicknesses = foam.thicknesses_m.iter().map(|thickness_m| ("thicknesses_m", *thickness_m, LENGTH_M));
+            for (field, value, range) in numbers.into_iter().chain(thicknesses) {
+                if !range.contains(&value) {
+                    let (low, high) = (range.start(), range.end());
+                    return wrong(&foam.name, format!("{field} is {value:?}; it has to be from {low:?} to {high:?}"));
                 }
             }
             if foam.thicknesses_m.is_empty() {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{anyhow, ensure};
 use tactomo::calibrate::force::{Direction, ForcePress};
+use tactomo::hertz::FORCE_N;
 use tactomo::table::{Array, Table};
 
 /// So many columns are named in errors.
@@ -112,9 +113,11 @@ impl Columns {
         let direction = |row: usize| self.named("unloading").map(|unloading| direction(unloading[row])).transpose();
         let known = |(row, force_n): (usize, &f64)| {
             ensure!(
-                *force_n > 0.0 && force_n.is_finite(),
-                "row {}: the force is {force_n} N, but has to be above zero",
-                row + 1
+                FORCE_N.contains(force_n),
+                "row {}: the force is {force_n:?} N, but has to be from {:?} to {:?} N",
+                row + 1,
+                FORCE_N.start(),
+                FORCE_N.end()
             );
             let direction = direction(row).map_err(|what| anyhow!("row {}: {what}", row + 1))?;
             Ok(KnownForce { force_n: *force_n, direction })
@@ -136,10 +139,16 @@ impl Columns {
 }
 
 fn sensor(times_s: &[f64], forces_n: &[f64]) -> anyhow::Result<Known> {
-    ensure!(
-        times_s.iter().chain(forces_n).all(|value| value.is_finite()),
-        "times and forces have to be finite numbers, but some are not"
-    );
+    ensure!(times_s.iter().all(|time_s| time_s.is_finite()), "times have to be finite numbers, but some are not");
+    // A sensor at rest tells nothing, or a little less.
+    if let Some(row) = forces_n.iter().position(|force_n| !(force_n.abs() <= *FORCE_N.end())) {
+        return Err(anyhow!(
+            "row {}: the force is {:?} N, but presses have up to {:?} N",
+            row + 1,
+            forces_n[row],
+            FORCE_N.end()
+        ));
+    }
     if let Some(row) = times_s.windows(2).position(|pair| pair[1] <= pair[0]) {
         return Err(anyhow!("row {}: time_s has to rise from row to row", row + 2));
     }
@@ -201,10 +210,13 @@ mod tests {
     fn what_is_wrong_with_forces_is_told() {
         for (text, told) in [
             ("time,force\n1,2\n", "a column named force_n is needed"),
-            ("force_n\n1\n0\n", "row 2: the force is 0 N"),
+            ("force_n\n1\n0\n", "row 2: the force is 0.0 N, but has to be from 1e-6 to 10000.0 N"),
+            ("force_n\n1\n1e308\n", "row 2: the force is 1e308 N"),
+            ("time_s,force_n\n0,1\n1,-1e308\n", "row 2: the force is -1e308 N, but presses have up to 10000.0 N"),
             ("force_n,unloading\n1,0\n2,2\n", "row 2: unloading is 2"),
             ("time_s,force_n\n1,1\n1,2\n", "row 2: time_s has to rise"),
-            ("time_s,force_n\n1,nan\n2,2\n", "have to be finite"),
+            ("time_s,force_n\n1,nan\n2,2\n", "row 1: the force is NaN N"),
+            ("time_s,force_n\nnan,1\n2,2\n", "have to be finite"),
         ] {
             assert!(read(text).is_err_and(|what| what.contains(told)), "{text}");
         }

@@ -38,7 +38,7 @@ export class Board {
       send({ settings: this.#asked() });
     };
     this.#showSource();
-    this.show({ hello: null, scan: null, statistics: null, playing: { kind: "board" } });
+    this.show({ hello: null, scan: null, statistics: null, playing: { kind: "board" }, learned_from: null });
   }
 
   #asked() {
@@ -63,7 +63,7 @@ export class Board {
   }
 
   /** Shows a status message. */
-  show({ hello, scan, statistics, playing }) {
+  show({ hello, scan, statistics, playing, learned_from: from }) {
     const { setup } = this;
     this.form.hidden = !hello || playing.kind === "recording";
     const [width, height] = [0, 1].map((k) => fixed((setup.bounds_m[1][k] - setup.bounds_m[0][k]) * 1e3, 0));
@@ -71,7 +71,7 @@ export class Board {
       ["Source", setup.source],
       ["Board", hello ? `${hello.board}, firmware ${hello.firmware}` : "has not answered yet"],
       ["Converter", hello ? `${hello.adc_bits} bits of ${fixed(hello.full_scale_v, 2)} V; drive ${fixed(hello.drive_v, 2)} V` : ""],
-      ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes`],
+      ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes${from ? `, as learned in ${from}` : ""}`],
       ["Images", `${count(setup.nodes_m.length)} points`],
       // Last, for it may take a line or two.
       ["Scan", hello ? scanned(scan, setup.electrodes.length, statistics.frames_per_s) : ""],

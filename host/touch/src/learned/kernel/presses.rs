@@ -10,7 +10,7 @@ use tactomo_table::{Table, TableError};
 const FEWEST: usize = 10;
 /// Rows whose places are this near (m) are of one press, or of presses at one place: robots repeat to 0.02 to 0.1 mm.
 const SAME_M: f64 = 1e-4;
-/// Farthest that a place is from the middle of all (m), hardest force (N) and deepest depth (m) that are believed: skins are smaller than a person, and no
+/// Farthest that a place is from the middle of all (m), hardest force (N) and deepest depth (m) that are believed: sensors are smaller than a person, and no
 /// finger or indenter presses a foam with the weight of a man.
 const FARTHEST_M: f64 = 1.5;
 const HARDEST_N: f64 = 500.0;

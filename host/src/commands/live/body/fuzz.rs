@@ -1,4 +1,4 @@
-//! Whatever a skin's file has in it, reading ends: with patches, or with an error that names the file.
+//! Whatever a body's file has in it, reading ends: with patches, or with an error that names the file.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -11,11 +11,11 @@ use proptest::sample::{Index, select};
 
 use super::*;
 
-/// A skin with each kind of value, and one that is in use.
-const SKINS: [&str; 2] = [
+/// A body with each kind of value, and one that is in use.
+const BODIES: [&str; 2] = [
     "# Five\n[[patch]]\nname = \"thumb\"\nsimulate = true\nforce = 0.5\nfault = [\"open:3\", \"short:4,5\"]\n\n\
      [[patch]]\nname = 'palm'\nport = \"/dev/ttyUSB1\"\nmax_fps = 100\ndetector = \"palm.toml\"\nno_learning = false\n",
-    include_str!("../../../../examples/skins/hand.toml"),
+    include_str!("../../../../examples/bodies/hand.toml"),
 ];
 
 /// Change of a text, at places that are shares of its length.
@@ -99,7 +99,7 @@ fn patch() -> impl Strategy<Value = String> {
 
 /// Checks what becomes of a file of these bytes; `test` has it for itself.
 fn check(test: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
-    let path = std::env::temp_dir().join(format!("tactomo-{}-{test}-skin.toml", process::id()));
+    let path = std::env::temp_dir().join(format!("tactomo-{}-{test}-body.toml", process::id()));
     fs::write(&path, bytes).map_err(|error| TestCaseError::fail(error.to_string()))?;
     match read(&path) {
         Ok(patches) => {
@@ -108,7 +108,7 @@ fn check(test: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
             let are_names = names.iter().flat_map(|name| name.chars()).all(|c| c.is_ascii() && c != '/');
             prop_assert!(are_names && !names.contains(""), "{:?}", names);
         }
-        Err(error) => prop_assert!(error.to_string().contains("-skin.toml"), "{error}"),
+        Err(error) => prop_assert!(error.to_string().contains("-body.toml"), "{error}"),
     }
     Ok(())
 }
@@ -120,8 +120,8 @@ proptest! {
     }
 
     #[test]
-    fn a_skin_that_is_damaged_is_patches_or_an_error(skin in select(SKINS.to_vec()), edits in vec(edit(), 1..6)) {
-        let mut bytes = skin.as_bytes().to_vec();
+    fn a_body_that_is_damaged_is_patches_or_an_error(body in select(BODIES.to_vec()), edits in vec(edit(), 1..6)) {
+        let mut bytes = body.as_bytes().to_vec();
         edits.into_iter().for_each(|edit| edit.apply(&mut bytes));
         check("damaged", &bytes)?;
     }
@@ -133,14 +133,14 @@ proptest! {
 }
 
 #[test]
-fn whole_skins_are_patches_and_deep_ones_end() {
-    for skin in SKINS {
-        assert!(of_text(skin, &PathBuf::from("skin.toml"), words).is_ok());
+fn whole_bodies_are_patches_and_deep_ones_end() {
+    for body in BODIES {
+        assert!(of_text(body, &PathBuf::from("body.toml"), words).is_ok());
     }
     for deep in ["[", "patch = [", "[[patch]]\nname = \"a\"\nport = [", "a.", "{a="] {
         let (first, rest) = deep.split_at(deep.len() - 1);
         assert!(
-            of_text(&format!("{first}{}", rest.repeat(100_000)), &PathBuf::from("skin.toml"), words).is_err(),
+            of_text(&format!("{first}{}", rest.repeat(100_000)), &PathBuf::from("body.toml"), words).is_err(),
             "{deep}"
         );
     }

@@ -1,6 +1,6 @@
-//! A skin: several detectors, each with its board, shown together.
+//! A body, such as a hand: several detectors, each with its board, shown together.
 //!
-//! A skin's file has a table `[[patch]]` for each detector: its `name`, its `place` on the body if it has one, and whatever options of `tactomo live`
+//! A body's file has a table `[[patch]]` for each detector: its `name`, its `place` on the body if it has one, and whatever options of `tactomo live`
 //! belong to one board, by their names. So what a patch may be asked for is what the command may be, and is checked by the same rules.
 //!
 //! A folder of recordings has such a file too, which comes from who knows where. It only says which of the folder's recordings are shown, and where their
@@ -16,15 +16,15 @@ use tactomo::table::file::{self, Format};
 use tactomo_cli::options;
 
 use super::Args;
-use crate::commands::recording::folder::{self, SKIN};
+use crate::commands::recording::folder;
 
 /// Most detectors that are shown together, of boards that are simulated too.
 pub const MOST: usize = 64;
-/// A skin's file.
-pub const FORMAT: Format = Format::new("a skin's file", 1 << 20);
+/// A body's file.
+pub const FORMAT: Format = Format::new("a body's file", 1 << 20);
 
 /// Options of the program as a whole, which a patch has none of.
-const OF_ALL: [&str; 7] = ["skin", "http-port", "listen", "allow-origin", "no-open", "json", "seconds"];
+const OF_ALL: [&str; 7] = ["body", "http-port", "listen", "allow-origin", "no-open", "json", "seconds"];
 /// Arguments of one board, which patches have in place of the command line; `simulated` are those of scenes.
 pub const OF_ONE: [&str; 23] = [
     "port",
@@ -51,23 +51,23 @@ pub const OF_ONE: [&str; 23] = [
     "speed",
     "simulated",
 ];
-/// Options whose values are files that are read, beside the skin's unless their paths are absolute.
+/// Options whose values are files that are read, beside the body's unless their paths are absolute.
 const FILES: [&str; 5] = ["detector", "learned", "jacobian", "replay", "elf"];
 
-/// Why a skin cannot be shown.
+/// Why a body cannot be shown.
 #[derive(Debug, thiserror::Error)]
-pub enum SkinError {
+pub enum BodyError {
     /// The file cannot be read.
-    #[error("cannot read the skin {path}")]
+    #[error("cannot read the body {path}")]
     Read {
         /// The file.
         path: PathBuf,
         /// What the system says.
         source: std::io::Error,
     },
-    /// The file is no skin.
-    #[error("{path} is no skin: {what}")]
-    Skin {
+    /// It is no body's file.
+    #[error("{path} is no body's file: {what}")]
+    Body {
         /// The file.
         path: PathBuf,
         /// Why, and what to do.
@@ -95,7 +95,7 @@ pub struct Patch {
     pub args: Args,
 }
 
-/// A skin's file.
+/// A body's file.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -119,15 +119,15 @@ struct Options {
     args: Args,
 }
 
-/// The detectors of a skin's file, or of a folder of recordings.
+/// The detectors of a body's file, or of a folder of recordings.
 ///
 /// # Errors
-/// [`SkinError`] if the file is no skin, or a patch asks for what cannot be.
-pub fn read(path: &Path) -> Result<Vec<Patch>, SkinError> {
-    let (path, is_folder) = if path.is_dir() { (path.join(SKIN), true) } else { (path.to_owned(), false) };
+/// [`BodyError`] if the file is no body, or a patch asks for what cannot be.
+pub fn read(path: &Path) -> Result<Vec<Patch>, BodyError> {
+    let (path, is_folder) = if path.is_dir() { (folder::body(path), true) } else { (path.to_owned(), false) };
     let checked = if is_folder { folder::check_own(&path) } else { Ok(()) };
     let text = checked.and_then(|()| FORMAT.read_text(&path));
-    let text = text.map_err(|source| SkinError::Read { path: path.clone(), source })?;
+    let text = text.map_err(|source| BodyError::Read { path: path.clone(), source })?;
     let words: Words = if is_folder { of_recording } else { words };
     of_text(&text, &path, words)
 }
@@ -135,17 +135,17 @@ pub fn read(path: &Path) -> Result<Vec<Patch>, SkinError> {
 /// Makes a command line of a patch's options; files that they name are sought in the folder.
 type Words = fn(&toml::Table, &Path) -> Result<Vec<String>, String>;
 
-fn of_text(text: &str, path: &Path, words: Words) -> Result<Vec<Patch>, SkinError> {
-    let no_skin = |what: String| SkinError::Skin { path: path.to_owned(), what };
-    let File { patch: patches } = toml::from_str(text).map_err(|error| no_skin(with_causes(&error)))?;
+fn of_text(text: &str, path: &Path, words: Words) -> Result<Vec<Patch>, BodyError> {
+    let no_body = |what: String| BodyError::Body { path: path.to_owned(), what };
+    let File { patch: patches } = toml::from_str(text).map_err(|error| no_body(with_causes(&error)))?;
     match patches.len() {
-        0 => return Err(no_skin("it has no [[patch]]".to_owned())),
+        0 => return Err(no_body("it has no [[patch]]".to_owned())),
         1..=MOST => {}
-        many => return Err(no_skin(format!("it has {many} patches, and {MOST} can be shown together"))),
+        many => return Err(no_body(format!("it has {many} patches, and {MOST} can be shown together"))),
     }
     let mut read: Vec<Patch> = Vec::with_capacity(patches.len());
     for Table { name, place, options } in patches {
-        let wrong = |what| SkinError::Patch { path: path.to_owned(), patch: name.clone(), what };
+        let wrong = |what| BodyError::Patch { path: path.to_owned(), patch: name.clone(), what };
         let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || !name.chars().all(is_name) {
             return Err(wrong("a name is of letters, digits, - and _, as it is part of an address".to_owned()));
@@ -251,7 +251,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Vec<Patch>, String> {
-        of_text(text, Path::new("skins/hand.toml"), words).map_err(|error| error.to_string())
+        of_text(text, Path::new("bodies/hand.toml"), words).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -266,7 +266,7 @@ mod tests {
         assert!(of_thumb.board.is_simulated() && of_thumb.board.scene.fault.len() == 1 && !of_palm.picture.no_learning);
         assert_eq!(of_palm.board.ports, ["/dev/ttyUSB1"]);
         let chosen = of_palm.picture.detector.detector.as_ref().map(|chosen| format!("{chosen:?}"));
-        assert!(chosen.is_some_and(|chosen| chosen.contains("skins/palm.toml")));
+        assert!(chosen.is_some_and(|chosen| chosen.contains("bodies/palm.toml")));
     }
 
     #[test]
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn options_of_one_board_are_refused_beside_a_skin_and_none_is_ignored() {
+    fn options_of_one_board_are_refused_beside_a_body_and_none_is_ignored() {
         let command = <Options as clap::CommandFactory>::command();
         for option in command.get_arguments().filter_map(clap::Arg::get_long) {
             let of_streams = option.starts_with("stream") || ["foxglove", "mcap", "record"].contains(&option);
@@ -289,20 +289,20 @@ mod tests {
             }
             let values = ["", "=1", "=a", "=4", "=rest", "=esp32", "=A", "=auto"];
             let is_taken = |value: &&str| {
-                let words = ["--skin=hand.toml".to_owned(), format!("--{option}{value}")];
+                let words = ["--body=hand.toml".to_owned(), format!("--{option}{value}")];
                 Options::try_parse_from(words).is_ok()
             };
-            assert!(!values.iter().any(is_taken), "--{option} beside --skin is ignored");
+            assert!(!values.iter().any(is_taken), "--{option} beside --body is ignored");
         }
     }
 
     #[test]
     fn of_a_folder_only_its_own_recordings_and_their_places_count() {
-        let folder = std::env::temp_dir().join(format!("tactomo-{}-skin-folder", std::process::id()));
+        let folder = std::env::temp_dir().join(format!("tactomo-{}-body-folder", std::process::id()));
         std::fs::create_dir_all(folder.join("sub")).unwrap();
         std::fs::write(folder.join("thumb.tactomo"), "").unwrap();
         let read = |options: &str| {
-            std::fs::write(folder.join(SKIN), format!("[[patch]]\nname = \"thumb\"\n{options}\n")).unwrap();
+            std::fs::write(folder.join(folder::BODY), format!("[[patch]]\nname = \"thumb\"\n{options}\n")).unwrap();
             super::read(&folder).map_err(|error| error.to_string())
         };
         let patches = read("replay = \"thumb.tactomo\"\nplace = { xyz_m = [0, 0, 1] }").unwrap();
@@ -338,7 +338,7 @@ mod tests {
         for (options, what) in [
             (
                 "seconds = 3",
-                "patch thumb of skins/hand.toml: seconds is of the program as a whole: give --seconds on the command line",
+                "patch thumb of bodies/hand.toml: seconds is of the program as a whole: give --seconds on the command line",
             ),
             ("sceen = \"ring\"", "\"sceen\" is no option of `tactomo live`"),
             ("\"listen=0.0.0.0:7999\" = true", "\"listen=0.0.0.0:7999\" is no option"),
@@ -353,7 +353,7 @@ mod tests {
             ("simulate = true\nstream = \"-\"", "give --stream - on the command line"),
             (
                 "place = { xyz_m = [0, 0, 0], rpy_rad = [0, 0, 90] }",
-                "patch thumb of skins/hand.toml: place: 90 in rpy_rad",
+                "patch thumb of bodies/hand.toml: place: 90 in rpy_rad",
             ),
             ("place = { xyz = [0, 0, 0] }", "unknown field `xyz`"),
             ("place = { rpy_rad = [0, 0, 0] }", "missing field `xyz_m`"),
@@ -364,7 +364,7 @@ mod tests {
         let many = "[[patch]]\nname = \"a\"\n".repeat(MOST + 1);
         assert!(read(&many).is_err_and(|error| error.contains("65 patches, and 64")));
         for text in ["", "patch = []", "name = 3", "[[patch]]\nsimulate = true", "\u{0}"] {
-            assert!(read(text).is_err_and(|error| error.starts_with("skins/hand.toml is no skin: ")), "{text}");
+            assert!(read(text).is_err_and(|error| error.starts_with("bodies/hand.toml is no body's file: ")), "{text}");
         }
     }
 }
