@@ -212,6 +212,32 @@ fn flags_say_what_is_wrong() {
     );
 }
 
+/// Readings at a floor bound a contact and speak for none: what has lifted is gone in the next frame, though all that is left says "no more than".
+#[test]
+fn a_contact_that_has_lifted_is_gone_where_all_readings_are_at_a_floor() {
+    for (_, bytes) in tables() {
+        let table = Table::read(&bytes).unwrap();
+        for (at_m, sheets) in [([0.004, -0.007], 0.02), ([-0.011, 0.004], 0.1), ([0.012, 0.006], 1.0)] {
+            let pressed = noisy(&volts(&table, &[spot(at_m[0], at_m[1], sheets)]), 3);
+            let largest_v = pressed.iter().fold(0.0f32, |most, v| most.max(*v));
+            for share in [0.0, 0.3, 0.6] {
+                let floor_v = share * largest_v;
+                let floored = |read: &[f32]| -> (Vec<f32>, Vec<Says>) {
+                    let says = |v: &f32| if *v <= floor_v { Says::AtMost } else { Says::Voltage };
+                    (read.iter().map(|v| v.max(floor_v)).collect(), read.iter().map(says).collect())
+                };
+                let mut solver = Solver::new();
+                let mut contacts = |(volts, says): (Vec<f32>, Vec<Says>)| {
+                    solver.solve(&table, &Frame::new(&volts, &says)).unwrap().contacts().len()
+                };
+                let there = [0; 3].map(|_| contacts(floored(&pressed)));
+                let lifted = [0; 2].map(|_| contacts(floored(&std::vec![if share > 0.0 { 0.0 } else { 1e-4 }; pressed.len()])));
+                assert_eq!((there[2], lifted[1]), (1, 0), "{at_m:?} {sheets} {share}: {there:?} {lifted:?}");
+            }
+        }
+    }
+}
+
 /// A fit of so many contacts that leaves so much, and says so much for each.
 fn fit(contacts: usize, cost: f32, information: f32) -> Fit {
     let scene = (0..contacts).fold(Scene::EMPTY, |scene, k| scene.with(spot(0.01 * k as f32, 0.0, 1.0)));
