@@ -1,23 +1,19 @@
-//! What holds for any detector: laws of circuits, derivatives, and what does not depend on how electrodes are counted.
+//! What holds for any detector: laws of circuits, fields and derivatives, and what a reading says.
 
 use std::vec::Vec;
 
 use crate::circuit::{Circuit, Spot};
-use crate::fit::{Fit, Fitting, Scene, Went};
 use crate::frame::{Errors, left_v};
 use crate::normal::{ANY_RADIUS, MOST, Normal, PARAMETERS, USUAL_RADIUS};
 use crate::samples::{CELLS, field_ohm, fields_ohm, grid_m, table, table_of};
-use crate::scan::{Candidate, NO_CANDIDATES, first};
-use crate::search::{Search, Wants};
-use crate::solver::Task;
-use crate::tests::{noisy, spot, volts};
-use crate::{Flags, Frame, MOST_PIECES, Says, Solver, Table};
+use crate::tests::{spot, volts};
+use crate::{Frame, Says, Table};
 
-const ALL: [u8; (CELLS * CELLS).div_ceil(8)] = [255; (CELLS * CELLS).div_ceil(8)];
+pub(crate) const ALL: [u8; (CELLS * CELLS).div_ceil(8)] = [255; (CELLS * CELLS).div_ceil(8)];
 /// Columns and rows of 8, 16 and 32 electrodes.
 const GRIDS: [[usize; 2]; 3] = [[4, 2], [4, 4], [8, 4]];
 
-fn tables() -> impl Iterator<Item = (Vec<[f32; 2]>, Vec<u8>)> {
+pub(crate) fn tables() -> impl Iterator<Item = (Vec<[f32; 2]>, Vec<u8>)> {
     GRIDS.into_iter().map(|[columns, rows]| {
         let pads_m = grid_m(columns, rows);
         let bytes = table_of(&pads_m, &ALL, |_| ());
@@ -231,7 +227,7 @@ fn fields_are_those_of_the_sheet_and_their_derivatives_their_differences() {
     }
 }
 
-fn summed(table: &Table<'_>, frame: &Frame<'_>, spots: &[Spot], deviation: f32) -> Normal {
+pub(crate) fn summed(table: &Table<'_>, frame: &Frame<'_>, spots: &[Spot], deviation: f32) -> Normal {
     let (mut circuit, mut normal) = (Circuit::EMPTY, Normal::EMPTY);
     assert!(circuit.solve(table, spots));
     normal.sum_up(table, &circuit, frame, &Errors::of(frame, table), deviation);
@@ -312,107 +308,6 @@ fn the_normal_matrix_is_how_the_sum_of_squares_bends() {
 }
 
 #[test]
-fn a_first_contact_is_where_it_is_for_any_number_of_electrodes_and_they_may_be_counted_anew() {
-    for (pads_m, bytes) in tables() {
-        let (table, n) = (Table::read(&bytes).unwrap(), pads_m.len());
-        // Every third after the other: an order in which none stays.
-        let order: Vec<usize> = (0..n).map(|e| (e * 3 + 1) % n).collect();
-        let renumbered = table_of(&order.iter().map(|e| pads_m[*e]).collect::<Vec<_>>(), &ALL, |_| ());
-        let other = Table::read(&renumbered).unwrap();
-        for truth in [&[spot(0.004, -0.007, 0.1)][..], &[spot(0.004, -0.009, 0.6), spot(-0.011, 0.004, 0.2)]] {
-            let read = noisy(&volts(&table, truth), 3);
-            let moved: Vec<_> = (0..n * n).map(|i| read[order[i / n] * n + order[i % n]]).collect();
-            let [frame, moved] = [&read, &moved].map(|volts| Frame::of_volts(volts));
-            if let [alone] = truth {
-                let errors = Errors::of(&frame, &table);
-                let (mut done, mut calls) = (crate::Work::default(), 0);
-                let mut attend = || calls += 1;
-                let mut work = crate::fit::Working { done: &mut done, attend: &mut attend };
-                let found = first(Task { table: &table, frame: &frame, errors: &errors }, &mut work)[0];
-                let off_m = (found.spot.at_m[0] - alone.at_m[0]).hypot(found.spot.at_m[1] - alone.at_m[1]);
-                assert!(off_m < 0.006 && (found.spot.ln_ohm - alone.ln_ohm).abs() < 0.1, "{n}: {found:?}");
-                assert!(calls >= 100 && calls == done.first_looks);
-            }
-            let [one, two] = [(&table, &frame), (&other, &moved)].map(|(t, f)| Solver::new().solve(t, f).unwrap());
-            assert_eq!((one.contacts().len(), one.flags), (truth.len(), Flags::default()), "{n} {one:?}");
-            for spot in truth {
-                let near = |answer: &crate::Answer| {
-                    let off = |c: &crate::Contact| (c.x_m - spot.at_m[0]).hypot(c.y_m - spot.at_m[1]);
-                    *answer.contacts().iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap()
-                };
-                let (a, b) = (near(&one), near(&two));
-                assert!((a.x_m - spot.at_m[0]).hypot(a.y_m - spot.at_m[1]) < 3e-4, "{n} {a:?}");
-                assert!((a.x_m - b.x_m).hypot(a.y_m - b.y_m) < 2e-5, "{n} {a:?} {b:?}");
-                assert!(
-                    (a.conductance_s / b.conductance_s - 1.0).abs() < 0.02
-                        && (a.sigma_m[0] / b.sigma_m[0] - 1.0).abs() < 0.05
-                );
-            }
-        }
-    }
-}
-
-/// Errors are what noise makes of places and strengths, and the radius is no better known than before.
-#[test]
-fn errors_are_those_of_many_draws() {
-    let bytes = table();
-    let table = Table::read(&bytes).unwrap();
-    let truth = [spot(0.004, -0.011, 0.3)];
-    let exact = volts(&table, &truth);
-    let mut squares = [0.0; 3];
-    for seed in 0..60 {
-        let noisy = noisy(&exact, 1000 + seed);
-        let answer = Solver::new().solve(&table, &Frame::of_volts(&noisy)).unwrap();
-        let found = answer.contacts()[0];
-        let own = found.conductance_s;
-        let error_s = own - Solver::new().solve(&table, &Frame::of_volts(&exact)).unwrap().contacts()[0].conductance_s;
-        for (square, error) in squares.iter_mut().zip([
-            (found.x_m - 0.004) / found.sigma_m[0],
-            (found.y_m + 0.011) / found.sigma_m[1],
-            error_s / found.conductance_sigma_s,
-        ]) {
-            *square += error * error / 60.0;
-        }
-        assert!(found.radius_sigma_m <= ANY_RADIUS * found.radius_m && found.radius_sigma_m > 0.0);
-        assert!(found.correlation.abs() < 1.0 && answer.residual > 0.3 && answer.residual < 1.3);
-    }
-    // The table has the noise somewhat larger, and a conductance an error of its own.
-    assert!(squares[..2].iter().all(|square| (0.15..2.0).contains(square)) && squares[2] < 2.0, "{squares:?}");
-}
-
-/// Where something presses over the edge, or where there is no detector.
-#[test]
-fn contacts_stay_on_the_detector() {
-    let mut mask = ALL;
-    // The right third is cut off.
-    (0..CELLS * CELLS).filter(|i| i % CELLS > 12).for_each(|i| mask[i / 8] &= !(1 << (i % 8)));
-    let bytes = table_of(&grid_m(4, 4), &mask, |_| ());
-    let table = Table::read(&bytes).unwrap();
-    let whole = crate::samples::table();
-    let whole = Table::read(&whole).unwrap();
-    assert!(table.holds(0.008, 0.0) && !table.holds(0.0095, 0.0) && whole.holds(0.0095, 0.0));
-    let [low_m, high_m] = whole.bounds_m();
-    (0..2).for_each(|d| assert!((low_m[d] + 0.03).abs() < 1e-6 && (high_m[d] - 0.03).abs() < 1e-6));
-    let mut told = 0;
-    for (at, of) in
-        [([0.014, 0.002], &table), ([0.0095, -0.02], &table), ([-0.0299, 0.0299], &whole), ([0.0299, 0.0], &whole)]
-    {
-        let read = noisy(&volts(&whole, &[spot(at[0], at[1], 1.0)]), 9);
-        let mut solver = Solver::new();
-        for _ in 0..3 {
-            let answer = solver.solve(of, &Frame::of_volts(&read)).unwrap();
-            told += answer.contacts().len();
-            assert!(answer.contacts().iter().all(|c| of.holds(c.x_m, c.y_m)), "{answer:?}");
-            let [low_m, high_m] = of.bounds_m();
-            let is_in =
-                |c: &crate::Contact| c.x_m >= low_m[0] && c.x_m <= high_m[0] && c.y_m >= low_m[1] && c.y_m <= high_m[1];
-            assert!(answer.contacts().iter().all(is_in), "{answer:?}");
-        }
-    }
-    assert!(told >= 4);
-}
-
-#[test]
 fn what_a_reading_says_bounds_a_model() {
     let volts = [0.5; 4];
     let says = [Says::Voltage, Says::AtMost, Says::AtLeast, Says::Nothing];
@@ -433,252 +328,4 @@ fn channels_are_corrected_by_gain_and_offset_but_for_what_rest_hides() {
     assert!((table.corrected_v(0, 0.5) - 0.502).abs() < 1e-6);
     assert!((table.corrected_v(0, 0.001) - 0.002).abs() < 1e-6);
     assert!((table.corrected_v(0, -0.001) + 0.001).abs() < 1e-6);
-}
-
-#[test]
-fn work_in_pieces_finds_the_same_and_each_piece_is_small() {
-    let bytes = table();
-    let table = Table::read(&bytes).unwrap();
-    let truth = [spot(0.004, -0.011, 0.3), spot(-0.015, 0.008, 1.0), spot(0.019, 0.014, 0.1)];
-    let (mut whole, mut pieces) = (Solver::new(), Solver::new());
-    for count in [0, 1, 0, 0, 3, 3, 3, 2, 2] {
-        let read = noisy(&if count == 0 { std::vec![0.0; 256] } else { volts(&table, &truth[..count]) }, count as u32);
-        let frame = Frame::of_volts(&read);
-        let expected = whole.solve(&table, &frame).unwrap();
-        assert!(!whole.is_busy());
-        let (mut calls, mut before, mut number) = (0, 0, 0);
-        let found = loop {
-            let found = pieces.solve_in_pieces(&table, &frame, 1, &mut || calls += 1).unwrap();
-            assert!(calls - before <= 260, "a piece is at most the places for a first contact, or 40 others");
-            assert!(found.is_some() || calls > before || number == 0, "each piece does something");
-            (before, number) = (calls, number + 1);
-            assert_eq!(pieces.is_busy(), found.is_none());
-            if let Some(found) = found {
-                break found;
-            }
-        };
-        assert_eq!(found, expected);
-        assert_eq!(calls, found.work.frames.iter().sum::<u32>() + found.work.first_looks + found.work.looks);
-    }
-    // A frame that is given up leaves nothing behind.
-    let read = noisy(&volts(&table, &truth), 4);
-    let mut given_up = Solver::new();
-    assert_eq!(given_up.solve_in_pieces(&table, &Frame::of_volts(&read), 5, &mut || ()), Ok(None));
-    let short = given_up.solve_in_pieces(&table, &Frame::of_volts(&read[..100]), 5, &mut || ());
-    assert!(short.is_err());
-    assert_eq!(given_up.solve(&table, &Frame::of_volts(&read)), Solver::new().solve(&table, &Frame::of_volts(&read)));
-}
-
-#[test]
-fn a_search_ends_on_any_readings_and_says_so() {
-    let bytes = table();
-    let table = Table::read(&bytes).unwrap();
-    let mut longest = 0;
-    // Any readings, and six contacts.
-    for seed in 1..30u32 {
-        let mut state = seed;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 24) as f32
-        };
-        let mut read: Vec<_> = (0..256).map(|_| if seed < 4 { 2.0 * random() } else { 0.0 }).collect();
-        for _ in 0..if seed < 4 { 0 } else { 6 } {
-            let spot = spot(0.05 * random() - 0.025, 0.05 * random() - 0.025, 10f32.powf(3.0 * random() - 2.0));
-            volts(&table, &[spot]).iter().zip(&mut read).for_each(|(v, sum)| *sum += v);
-        }
-        let mut solver = Solver::new();
-        let mut pieces = 0;
-        let answer = loop {
-            pieces += 1;
-            if let Some(answer) = solver.solve_in_pieces(&table, &Frame::of_volts(&read), 1, &mut || ()).unwrap() {
-                break answer;
-            }
-        };
-        longest = longest.max(pieces);
-        assert!(pieces < MOST_PIECES || answer.flags.has(Flags::MISFIT), "{answer:?}");
-        // It is not searched again at once.
-        let next = solver.solve(&table, &Frame::of_volts(&read)).unwrap();
-        assert!(!answer.flags.has(Flags::MISFIT) || next.work.looks == 0, "{next:?}");
-    }
-    // What was followed before, and the last look.
-    assert!((MOST_PIECES..=MOST_PIECES + 30).contains(&longest), "{longest}");
-}
-
-#[test]
-fn flags_say_what_is_wrong() {
-    let bytes = table();
-    let table = Table::read(&bytes).unwrap();
-    let answer = |table: &Table<'_>, read: &[f32]| Solver::new().solve(table, &Frame::of_volts(read)).unwrap();
-    // As firm as the driving layer itself.
-    let firm = answer(&table, &noisy(&volts(&table, &[spot(0.0, 0.0, 1e4)]), 1));
-    assert!(firm.flags.has(Flags::SATURATED) && firm.contacts().len() == 1, "{firm:?}");
-    // Five are more than three.
-    let mut five = std::vec![0.0; 256];
-    for at in [[-0.021, -0.018], [0.02, -0.015], [0.003, 0.002], [-0.017, 0.022], [0.016, 0.02]] {
-        volts(&table, &[spot(at[0], at[1], 0.1)]).iter().zip(&mut five).for_each(|(v, sum)| *sum += v);
-    }
-    let many = answer(&table, &noisy(&five, 2));
-    assert!(many.flags.has(Flags::MORE) && many.contacts().len() == 3, "{many:?}");
-    // A detector that is not known well, and readings that show it, or do not.
-    let unknown = table_of(&grid_m(4, 4), &ALL, |head| head.model_share = 0.05);
-    let unknown = Table::read(&unknown).unwrap();
-    let sound = noisy(&volts(&table, &[spot(0.0, 0.0, 0.3)]), 1);
-    let off: Vec<_> =
-        sound.iter().enumerate().map(|(i, v)| v * (1.0 + 0.03 * ((i * 37 % 11) as f32 / 5.0 - 1.0))).collect();
-    assert!(answer(&unknown, &off).flags.has(Flags::CALIBRATE));
-    assert!(
-        !answer(&unknown, &sound).flags.has(Flags::CALIBRATE) && !answer(&table, &sound).flags.has(Flags::CALIBRATE)
-    );
-}
-
-/// A fit of so many contacts that leaves so much, and says so much for each.
-fn fit(contacts: usize, cost: f32, information: f32) -> Fit {
-    let scene = (0..contacts).fold(Scene::EMPTY, |scene, k| scene.with(spot(0.01 * k as f32, 0.0, 1.0)));
-    Fit { scene, cost, objective: cost, information: [information; 3], ..Fit::NONE }
-}
-
-fn starts(gains: &[f32]) -> crate::scan::Candidates {
-    let mut all = NO_CANDIDATES;
-    all.iter_mut().zip(gains).for_each(|(one, gain)| *one = Candidate { spot: spot(0.02, 0.01, 1.0), gain: *gain });
-    all
-}
-
-/// Runs a search on made-up fits, by how many contacts they have; what it asked to be fitted, and what it found.
-fn run(
-    search: &mut Search,
-    mut wants: Wants,
-    mut of: impl FnMut(&Scene, f32) -> Option<Fit>,
-    mut gain: impl FnMut(&Scene) -> f32,
-) -> (Vec<(usize, f32)>, Option<Fit>) {
-    let mut asked = Vec::new();
-    for _ in 0..200 {
-        wants = match wants {
-            Wants::Fit(scene, deviation, _) => {
-                asked.push((scene.count, deviation));
-                let found = of(&scene, deviation);
-                search.fitted(found, 240.0)
-            }
-            Wants::First => {
-                search.starts = starts(&[gain(&Scene::EMPTY)]);
-                search.placed(240.0)
-            }
-            Wants::Beside(scene, _) => {
-                search.starts = starts(&[gain(&scene)]);
-                search.placed(240.0)
-            }
-            Wants::Nothing(found) => return (asked, found),
-        };
-    }
-    panic!("a search without end: {asked:?}");
-}
-
-#[test]
-fn a_search_grows_exchanges_and_reduces() {
-    // Nothing there.
-    let mut search = Search::NONE;
-    let wants = search.begin(None, Some(starts(&[59.0])), 240.0);
-    assert!(matches!(wants, Wants::Nothing(None)));
-    // Two contacts, each worth it: tried with usual radii, then fitted with any.
-    let costs = [0.0, 5000.0, 240.0, 239.0];
-    let by_count =
-        |scene: &Scene, _| Some(fit(scene.count, costs[scene.count], 2000.0)).filter(|fit| fit.scene.count > 0);
-    let gains = |scene: &Scene| if scene.count < 2 { 4000.0 } else { 10.0 };
-    let wants = search.begin(None, None, 240.0);
-    let (asked, found) = run(&mut search, wants, by_count, gains);
-    assert_eq!(found.unwrap().scene.count, 2);
-    let [usual, any] = [USUAL_RADIUS, ANY_RADIUS];
-    assert_eq!(asked, [(1, usual), (1, usual), (1, any), (2, usual), (2, usual), (2, any)]);
-    assert!(!search.more);
-    // What was followed and fits is taken on; what left room for more is not.
-    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0);
-    let (asked, _) = run(&mut search, wants, by_count, gains);
-    assert_eq!(asked, [(2, any)]);
-    search.more = true;
-    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0);
-    assert!(run(&mut search, wants, by_count, gains).0.len() > 1);
-    // Contacts that leave too much: each is looked for anew, beside the one that stays.
-    let bad = |scene: &Scene, _| {
-        Some(fit(scene.count, 9000.0 / (scene.count as f32 + 1.0), 2000.0)).filter(|fit| fit.scene.count > 0)
-    };
-    let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0);
-    let (asked, found) = run(&mut search, wants, bad, gains);
-    assert_eq!(found.unwrap().scene.count, 2);
-    let anew = asked.windows(2).filter(|two| two[0] == (2, any) && two[1] == (1, usual)).count();
-    assert_eq!(anew, 2, "{asked:?}");
-    // One of which little is known is left out where the other does as well.
-    let alike = |scene: &Scene, _| {
-        Some(fit(scene.count, if scene.count == 1 { 241.0 } else { 230.0 }, 500.0)).filter(|fit| fit.scene.count > 0)
-    };
-    let mut search = Search::NONE;
-    let wants = search.begin(Some(fit(2, 230.0, 500.0)), None, 240.0);
-    let (asked, found) = run(&mut search, wants, alike, |_| 0.0);
-    assert_eq!((found.unwrap().scene.count, &asked[1..]), (1, &[(1, any), (1, any)][..]));
-    // One that readings do not speak for goes, and with the last of them all.
-    let wants = search.begin(Some(fit(1, 230.0, 20.0)), None, 240.0);
-    assert!(
-        run(
-            &mut search,
-            wants,
-            |scene, _| Some(fit(scene.count, 230.0, 20.0)).filter(|fit| fit.scene.count > 0),
-            |_| 0.0
-        )
-        .1
-        .is_none()
-    );
-    // Where one more beside three would explain much, that is said.
-    let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0);
-    let (_, found) = run(
-        &mut search,
-        wants,
-        |scene, _| Some(fit(scene.count, 900.0 / scene.count.max(1) as f32, 2000.0)).filter(|fit| fit.scene.count > 0),
-        |_| 500.0,
-    );
-    assert!(search.more && found.unwrap().scene.count == 3);
-}
-
-/// What a search would add beside a contact is what is missing there, and gains what a fit gains by it.
-#[test]
-fn one_more_is_looked_for_where_it_is_missing() {
-    for (_, bytes) in tables().skip(1) {
-        let table = Table::read(&bytes).unwrap();
-        let (there, missing) = (spot(0.004, -0.009, 0.5), spot(-0.012, 0.006, 0.02));
-        let mut read = volts(&table, &[there, missing]);
-        let mut says: Vec<_> = read.iter().map(|_| Says::Voltage).collect();
-        // One reading is not known, and says nothing whatever stands there.
-        (says[21], read[21]) = (Says::Nothing, 1.7);
-        let frame = Frame::new(&read, &says);
-        let errors = Errors::of(&frame, &table);
-        let task = Task { table: &table, frame: &frame, errors: &errors };
-        // The one that is there is fitted as well as it goes by itself.
-        let (mut circuit, mut fitting, mut looks) = (Circuit::EMPTY, Fitting::NONE, crate::Work::default());
-        fitting.begin(Scene::EMPTY.with(there), ANY_RADIUS, 20);
-        let alone = loop {
-            let mut work = crate::fit::Working { done: &mut looks, attend: &mut || () };
-            if let Went::ToEnd(found) = fitting.go_on(task, &mut circuit, &mut work) {
-                break found.unwrap();
-            }
-        };
-        assert!(circuit.solve(&table, alone.scene.spots()));
-        let normal = fitting.normal;
-        let (mut done, mut best, mut from, mut pieces) = (crate::Work::default(), NO_CANDIDATES, Some(0), 0);
-        while let Some(at) = from {
-            let mut work = crate::fit::Working { done: &mut done, attend: &mut || () };
-            from = crate::beside::beside(task, &circuit, &normal, at, &mut best, &mut work);
-            pieces += 1;
-        }
-        assert!(pieces == done.looks.div_ceil(40) && done.looks > 80, "{pieces} {done:?}");
-        let found = best[0];
-        let off_m = (found.spot.at_m[0] - missing.at_m[0]).hypot(found.spot.at_m[1] - missing.at_m[1]);
-        assert!(off_m < 0.007, "{found:?}");
-        let with = summed(&table, &frame, &[there, missing], ANY_RADIUS).objective();
-        let without = normal.objective();
-        assert!(
-            found.gain > 0.4 * (without - with) && found.gain < 1.1 * (without - with),
-            "{} {with} {without}",
-            found.gain
-        );
-        assert!(((found.spot.ln_ohm - missing.ln_ohm).abs()) < 0.5, "{found:?}");
-    }
 }

@@ -27,6 +27,8 @@ mod contents;
 mod crc;
 mod fields;
 mod fit;
+#[cfg(test)]
+mod found;
 mod frame;
 mod head;
 #[cfg(test)]

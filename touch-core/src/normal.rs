@@ -1,11 +1,13 @@
 //! Normal equations of contacts, summed up row by row of a frame, and steps by them.
 
 use crate::circuit::{Circuit, Loaded, MAX_CONTACTS, TURNED};
-use crate::frame::{Errors, Frame, left_v};
+use crate::frame::{Errors, Frame, Says, left_v};
 use crate::table::{MAX_ELECTRODES, Table};
 
 /// Parameters of a contact: its place along x and y in usual radii, the logarithm of its resistance, that of its radius.
 pub(crate) const PARAMETERS: usize = 4;
+/// Of them that of its resistance.
+const STRENGTH: usize = 2;
 /// Of all contacts.
 pub(crate) const MOST: usize = PARAMETERS * MAX_CONTACTS;
 /// Standard deviation of the logarithm of a radius before anything is read: a factor of two.
@@ -29,10 +31,19 @@ pub(crate) struct Normal {
     pub cost: f32,
     /// The same of what was known of radii before.
     pub known: f32,
+    /// Diagonal of `J' W J` for each contact's strength by the readings that can speak for one: of a bound from above that it comes up to none does.
+    said: [f32; MAX_CONTACTS],
 }
 
 impl Normal {
-    pub const EMPTY: Self = Self { count: 0, matrix: [[0.0; MOST]; MOST], pull: [0.0; MOST], cost: 0.0, known: 0.0 };
+    pub const EMPTY: Self = Self {
+        count: 0,
+        matrix: [[0.0; MOST]; MOST],
+        pull: [0.0; MOST],
+        cost: 0.0,
+        known: 0.0,
+        said: [0.0; MAX_CONTACTS],
+    };
 
     /// What contacts leave of a frame.
     ///
@@ -61,6 +72,10 @@ impl Normal {
                     let pattern = Pattern::of(one, head.radius_m, |values| values[e]);
                     slopes.add(circuit, k, &pattern, 1.0 - volts[e] / head.drive_v, &mut slope);
                 }
+                if frame.says_at(index) != Says::AtMost {
+                    let by_strength = slope.iter().skip(STRENGTH).step_by(PARAMETERS);
+                    self.said.iter_mut().zip(by_strength).for_each(|(said, slope)| *said += slope * slope);
+                }
                 let by_pad_v = errors.pad_v(table, frame, g, e);
                 self.cost += left_v * left_v;
                 left_by_pad += left_v * by_pad_v;
@@ -88,6 +103,7 @@ impl Normal {
 
     fn weigh(&mut self, weight: f32) {
         self.cost *= weight;
+        self.said.iter_mut().for_each(|said| *said *= weight);
         for i in 0..self.count {
             self.pull[i] *= weight;
             (0..=i).for_each(|j| self.matrix[i][j] *= weight);
@@ -122,9 +138,9 @@ impl Normal {
     pub fn information(&self) -> [f32; MAX_CONTACTS] {
         let covariance = self.covariance();
         core::array::from_fn(|k| {
-            let strength = PARAMETERS * k + 2;
+            let strength = PARAMETERS * k + STRENGTH;
             let left = covariance.as_ref().map_or(f32::INFINITY, |all| 1.0 / all[strength][strength]);
-            self.matrix[strength][strength].min(left)
+            self.matrix[strength][strength].min(left).min(self.said[k])
         })
     }
 

@@ -1,19 +1,10 @@
-//! The firmware library: on mocked parts, and as the simulated board.
+//! The firmware library with detectors that are compiled and simulated, and as the simulated board. On mocked parts alone: `firmware/tests`.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod bench;
 mod closed_loop;
-mod commands;
 mod contacts;
-mod failures;
-mod flash;
 mod hid;
-mod nor_flash;
+#[path = "../../../firmware/tests/board/parts.rs"]
 mod parts;
-mod plans;
-mod rate;
-mod samplers;
-mod scan;
-mod switches;
-mod uplink;
 mod wiring;

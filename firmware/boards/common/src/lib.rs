@@ -6,6 +6,7 @@ pub mod bounded;
 pub mod brown_out;
 pub mod clock;
 pub mod converters;
+pub mod paint;
 pub mod panic_record;
 pub mod quartz;
 pub mod range;

@@ -6,6 +6,8 @@ pub mod analog;
 pub mod brown_out;
 mod chip;
 #[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
+mod guard;
+#[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
 pub mod one_input;
 mod table;
 #[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
@@ -39,6 +41,8 @@ where
     C: Chip,
     T: Touch,
 {
+    #[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
+    guard::widen();
     let identity = Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),
         board: name,

@@ -7,6 +7,7 @@ use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo_firmware::{Mux, TimedOut};
 use tactomo_protocol::{Command, Fault, Plan, Scope, Settings, Status};
 
+use super::more_parts::*;
 use super::parts::*;
 
 /// A multiplexer that notes what it grounds, and of which one call fails.

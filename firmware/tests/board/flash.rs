@@ -5,10 +5,10 @@ use std::sync::LazyLock;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use proptest::prelude::*;
 use proptest::sample::select;
-use tactomo::detector::Detector;
-use tactomo::solve::{Problem, compile};
 use tactomo_firmware::{ContactFinder, FlashStore, RamCopy, TableStore, Touch, View};
 use tactomo_protocol::{Hello, MAX_PIECE, Output, Settings, TablePiece, TableState};
+use tactomo_touch_core::Contents;
+use tactomo_touch_core::table::{Head, OTHERS, RADII};
 
 use crate::nor_flash::{Chip, Trouble};
 
@@ -18,8 +18,8 @@ const BASES: [usize; 2] = [2 * ROOM, ROOM];
 /// What lies before and behind them.
 const END: usize = 3 * ROOM;
 
-static FIRST: LazyLock<Vec<u8>> = LazyLock::new(|| table_of("square-60"));
-static SECOND: LazyLock<Vec<u8>> = LazyLock::new(|| table_of("square-150"));
+static FIRST: LazyLock<Vec<u8>> = LazyLock::new(|| table_of([36, 36]));
+static SECOND: LazyLock<Vec<u8>> = LazyLock::new(|| table_of([30, 36]));
 /// As the first but for one coefficient.
 static ALIKE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let mut table = FIRST.clone();
@@ -30,8 +30,42 @@ static ALIKE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     table
 });
 
-fn table_of(preset: &str) -> Vec<u8> {
-    compile(&Problem::of(&Detector::preset(preset).unwrap()).unwrap()).unwrap()
+/// A table with so many coefficients along its sides, which are anything.
+fn table_of(sides: [usize; 2]) -> Vec<u8> {
+    const N: usize = 16;
+    let head = Head {
+        step_x_m: 0.002,
+        step_y_m: 0.002,
+        radius_m: 0.002,
+        radii_m: [0.001, 0.004],
+        near_m: 0.002,
+        ln_step: 0.5,
+        drive_v: 2.0,
+        noise_v: 0.001,
+        full_v: 1.99,
+        sheet_s: 1e-3,
+        top_s_per_m: 0.2,
+        constriction_ohm: 1.0,
+        ..Head::default()
+    };
+    let mut random = fastrand::Rng::with_seed(sides[0] as u64);
+    let cells = (sides[0] - 3) * (sides[1] - 3);
+    let coefficients: Vec<_> = (0..sides[0] * sides[1] * RADII * (N + OTHERS)).map(|_| random.i16(..)).collect();
+    let mut bytes = Vec::new();
+    Contents {
+        head,
+        places_m: &[[0.0; 3]; N],
+        sides,
+        pads_ohm: &[1000.0; N * (N + 1) / 2],
+        channels: &[[1.0, 0.0]; N],
+        distances_ohm: &[0.0; 4],
+        walls: &[0.0; (N + 1) * (N + 2) / 2],
+        codes: &[[0.0, 1.0]; RADII * (N + OTHERS)],
+        mask: &vec![255; cells.div_ceil(8)],
+        coefficients: &coefficients,
+    }
+    .write(&mut bytes);
+    bytes
 }
 
 /// Both ways to see flash.

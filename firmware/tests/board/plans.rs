@@ -3,6 +3,7 @@
 use tactomo_firmware::{Activity, Adc, Board16, Identity, NoTouch, Parts};
 use tactomo_protocol::{Command, Fault, Plan, Range, Scope, Settings, Status};
 
+use super::more_parts::*;
 use super::parts::*;
 
 fn plan(grounds: &[u8], reads: u32, rows_a_frame: u8, average_log2: u8) -> Plan {

@@ -6,6 +6,7 @@ use std::rc::Rc;
 use tactomo_firmware::{Activity, Board16, ConverterPair, NoTouch, Parts, Row, Sampler, SideBySide, TimedOut};
 use tactomo_protocol::{Command, Fault, Plan, Settings, Status};
 
+use super::more_parts::*;
 use super::parts::*;
 
 type Record = Rc<RefCell<Vec<String>>>;

@@ -13,6 +13,7 @@ use tactomo_firmware::TimedOut;
 use tactomo_firmware::mux::{Enabled, LatchLines, Latched, Transparent};
 use tactomo_protocol::{Command, Fault, Settings, Status};
 
+use super::more_parts::*;
 use super::parts::*;
 
 const HIGH: State = State::High;

@@ -2,6 +2,7 @@
 
 use tactomo_protocol::{BoardMessage, BoardReceiver, Command, DecodeError, Fault, Plan, Settings};
 
+use super::more_parts::*;
 use super::parts::*;
 
 #[test]

@@ -4,7 +4,8 @@ use proptest::prelude::*;
 use tactomo_firmware::Activity;
 use tactomo_protocol::{BoardMessage, Command, Fault};
 
-use crate::parts::{Outside, faults, frames, hellos, numbered, scan, simple_board, step};
+use crate::more_parts::{faults, numbered, scan};
+use crate::parts::{Outside, frames, hellos, simple_board, step};
 
 const RATES: [u32; 3] = [921_600, 2_000_000, 3_000_000];
 

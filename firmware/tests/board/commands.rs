@@ -7,6 +7,7 @@ use tactomo_protocol::{
     VERSION, encode_request,
 };
 
+use super::more_parts::*;
 use super::parts::*;
 
 #[test]

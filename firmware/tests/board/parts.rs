@@ -9,7 +9,7 @@ use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo_firmware::mux::Mux;
 use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, NoTouch, Parts, Sampler, Serial, TimedOut, Touch};
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, Fault, Frame, Hello, MAX_COMMAND, Request, encode_request,
+    BoardMessage, BoardReceiver, Command, Frame, Hello, MAX_COMMAND, Request, encode_request,
 };
 
 /// Time of one conversion of the test's converter (us).
@@ -70,7 +70,7 @@ pub struct Watchdog {
 }
 
 /// The serial line of a test board.
-pub struct TestSerial(Outside);
+pub struct TestSerial(pub Outside);
 
 impl Serial for TestSerial {
     fn rates(&self) -> &'static [u32] {
@@ -141,7 +141,7 @@ impl<D: DelayNs> Chip for TestChip<D> {
 }
 
 /// A converter that answers with a function of the conversion's number and the electrode, and takes its time.
-pub struct TestSampler<F>(Outside, F);
+pub struct TestSampler<F>(pub Outside, pub F);
 
 impl<F: FnMut(u64, u8) -> Result<u16, TimedOut>> Sampler for TestSampler<F> {
     fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
@@ -167,58 +167,7 @@ impl Mux for NoMux {
     }
 }
 
-/// A part that takes no room.
-pub struct NullPart;
-
-impl Sampler for NullPart {
-    fn sample(&mut self, _electrode: u8) -> Result<u16, TimedOut> {
-        Ok(0)
-    }
-}
-
-impl Serial for NullPart {
-    fn push(&mut self, bytes: &[u8]) -> usize {
-        bytes.len()
-    }
-
-    fn pull(&mut self, _buffer: &mut [u8]) -> usize {
-        0
-    }
-}
-
-impl DelayNs for NullPart {
-    fn delay_ns(&mut self, _ns: u32) {}
-}
-
-impl Chip for NullPart {
-    fn now_us(&mut self) -> u64 {
-        0
-    }
-
-    fn feed_watchdog(&mut self) {}
-}
-
 pub type TestBoard<M, F, D, T = NoTouch> = Board16<M, TestSampler<F>, TestSerial, TestChip<D>, T>;
-
-/// The code of conversion `number` when nothing is averaged: a number of its own for every reading of a frame.
-pub fn numbered(number: u64, _electrode: u8) -> Result<u16, TimedOut> {
-    Ok(4 * (number % 256) as u16)
-}
-
-/// A reading of ten bits that no other tells: a frame of such is not shorter by what it differs by from another.
-pub fn restless(number: u64, _electrode: u8) -> Result<u16, TimedOut> {
-    Ok((number.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 54) as u16)
-}
-
-/// The line of a board with this outside.
-pub fn serial(outside: &Outside) -> TestSerial {
-    TestSerial(outside.clone())
-}
-
-/// A converter that takes its time of this outside's clock.
-pub fn sampler<F: FnMut(u64, u8) -> Result<u16, TimedOut>>(outside: &Outside, sample: F) -> TestSampler<F> {
-    TestSampler(outside.clone(), sample)
-}
 
 /// A board of these parts.
 pub fn board<M: Mux, F, D: DelayNs>(outside: &Outside, mux: M, sample: F, delay: D) -> TestBoard<M, F, D>
@@ -283,40 +232,15 @@ where
     }
 }
 
-/// Steps until `frames` scans are done.
-pub fn scan<M: Mux, F, D: DelayNs>(board: &mut TestBoard<M, F, D>, frames: usize)
-where
-    F: FnMut(u64, u8) -> Result<u16, TimedOut>,
-    M::Error: std::fmt::Debug,
-{
-    for _ in 0..frames {
-        while board.step().unwrap() != Activity::Frame {}
-    }
-}
-
 impl Outside {
     pub fn advance_us(&self, us: u64) {
         self.clock_us.set(self.clock_us.get() + us);
-    }
-
-    /// Sends a command with the tag 1.
-    pub fn send(&self, command: Command) {
-        self.send_tagged(1, command);
     }
 
     pub fn send_tagged(&self, tag: u8, command: Command) {
         let mut packet = [0; MAX_COMMAND];
         let length = encode_request(&Request { tag, command }, &mut packet).unwrap();
         self.send_bytes(&packet[..length]);
-    }
-
-    /// Sends a command of which nothing is there yet when the board looks next.
-    pub fn send_while_waiting(&self, command: Command) {
-        let mut packet = [0; MAX_COMMAND];
-        let length = encode_request(&Request { tag: 1, command }, &mut packet).unwrap();
-        let mut wire = self.wire.borrow_mut();
-        wire.soon = packet[..length].to_vec();
-        wire.pulls = 0;
     }
 
     pub fn send_bytes(&self, bytes: &[u8]) {
@@ -348,12 +272,5 @@ pub fn hellos(messages: &[BoardMessage]) -> Vec<&Hello> {
     messages
         .iter()
         .filter_map(|message| if let BoardMessage::Hello(hello) = message { Some(hello) } else { None })
-        .collect()
-}
-
-pub fn faults(messages: &[BoardMessage]) -> Vec<&Fault> {
-    messages
-        .iter()
-        .filter_map(|message| if let BoardMessage::Fault(fault) = message { Some(fault) } else { None })
         .collect()
 }
