@@ -247,7 +247,7 @@ fn a_pipe_is_no_recording_and_nobody_waits_for_it() {
         recording(&["export", "--to", "csv", "--out", "OUT"]),
         recording(&["reconstruct"]),
         recording(&["calibrate", "rub", "--out", "OUT"]),
-        recording(&["calibrate", "presses", "--at", "1:0,0", "--out", "OUT"]),
+        recording(&["calibrate", "presses", "--known", "1:0,0", "--out", "OUT"]),
         recording(&["calibrate", "force", "--newtons", "1,2,3,4", "--out", "OUT"]),
     ] {
         let named = |arg: &&str| match *arg {
