@@ -115,7 +115,6 @@ fn contacts_stay_on_the_detector() {
     assert!(told >= 4);
 }
 
-
 #[test]
 fn work_in_pieces_finds_the_same_and_each_piece_is_small() {
     let bytes = table();
@@ -231,7 +230,8 @@ fn a_contact_that_has_lifted_is_gone_where_all_readings_are_at_a_floor() {
                     solver.solve(&table, &Frame::new(&volts, &says)).unwrap().contacts().len()
                 };
                 let there = [0; 3].map(|_| contacts(floored(&pressed)));
-                let lifted = [0; 2].map(|_| contacts(floored(&std::vec![if share > 0.0 { 0.0 } else { 1e-4 }; pressed.len()])));
+                let lifted =
+                    [0; 2].map(|_| contacts(floored(&std::vec![if share > 0.0 { 0.0 } else { 1e-4 }; pressed.len()])));
                 assert_eq!((there[2], lifted[1]), (1, 0), "{at_m:?} {sheets} {share}: {there:?} {lifted:?}");
             }
         }
@@ -414,10 +414,14 @@ fn who_stays_keeps_its_number_and_who_comes_gets_a_new_one() {
         for again in 0..3 {
             let read = noisy(&exact, (10 * seed + again) as u32);
             let answer = solver.solve(&table, &Frame::of_volts(&read)).unwrap();
-            told = answer.contacts().iter().map(|c| {
-                let off = |k: &usize| (c.x_m - all[*k].at_m[0]).hypot(c.y_m - all[*k].at_m[1]);
-                ((0..3).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap(), c.id)
-            }).collect();
+            told = answer
+                .contacts()
+                .iter()
+                .map(|c| {
+                    let off = |k: &usize| (c.x_m - all[*k].at_m[0]).hypot(c.y_m - all[*k].at_m[1]);
+                    ((0..3).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap(), c.id)
+                })
+                .collect();
         }
         told.sort_unstable();
         let mut expected = there.to_vec();

@@ -181,7 +181,9 @@ fn moments_and_conductances_change_with_the_parameters_as_their_derivatives_say(
         assert!(circuit.solve(&table, &[spot]));
         circuit.loaded[0].clone()
     };
-    for (at_m, sheets, ln_radius) in [([0.004, -0.011], 0.3, 0.1), ([-0.0255, 0.009], 2.0, 0.3), ([0.012, 0.006], 20.0, -0.2)] {
+    for (at_m, sheets, ln_radius) in
+        [([0.004, -0.011], 0.3, 0.1), ([-0.0255, 0.009], 2.0, 0.3), ([0.012, 0.006], 20.0, -0.2)]
+    {
         let begun = Spot { ln_radius, ..spot(at_m[0], at_m[1], sheets) };
         let one = loaded(begun);
         let scale = one.half_moment_by.iter().fold(0.0f32, |most, half| most.max(half.abs()));
@@ -212,9 +214,13 @@ fn moments_and_conductances_change_with_the_parameters_as_their_derivatives_say(
             for with_ohm in if sheets < 1.0 { &[0.0, 1.0][..] } else { &[] } {
                 let mut error = [0.0; PARAMETERS];
                 (error[2], error[parameter]) = (*with_ohm, error[parameter] + 1.0);
-                let expected = error[parameter] * change(parameter) + if parameter == 2 { 0.0 } else { with_ohm * change(2) };
+                let expected =
+                    error[parameter] * change(parameter) + if parameter == 2 { 0.0 } else { with_ohm * change(2) };
                 let found = (with(error) - own).sqrt();
-                assert!((found - expected.abs()).abs() < 0.05 * expected.abs() + 0.01, "{parameter} {found} {expected}");
+                assert!(
+                    (found - expected.abs()).abs() < 0.05 * expected.abs() + 0.01,
+                    "{parameter} {found} {expected}"
+                );
             }
         }
     }
