@@ -258,6 +258,7 @@ mod tests {
     fn places_are_rounded_to_the_nearest_and_held_in_range() {
         let contact = ContactCode::new(7, [0.0123456, -0.02], 2e-4, f32::INFINITY);
         assert_eq!((contact.id, contact.at, contact.sigma_m()), (7, [1235, -2000], None));
+        assert!(contact.at_m().iter().zip([0.01235, -0.02]).all(|(back_m, at_m)| (back_m - at_m).abs() < 1e-7));
         assert!((contact.conductance_s() / 2e-4 - 1.0).abs() < 3e-4);
         let far = ContactCode::new(0, [1.0, f32::NAN], 0.0, 1e-4);
         assert_eq!(far.at, [i16::MAX, 0]);

@@ -22,7 +22,7 @@ pub(crate) fn tables() -> impl Iterator<Item = (Vec<[f32; 2]>, Vec<u8>)> {
 }
 
 /// Solves linear equations by elimination with pivots.
-fn solved(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Vec<f64> {
+pub(crate) fn solved(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Vec<f64> {
     let n = right.len();
     for i in 0..n {
         let pivot = (i..n).max_by(|a, b| matrix[*a][i].abs().total_cmp(&matrix[*b][i].abs())).unwrap();
@@ -169,6 +169,61 @@ fn moments_are_those_of_discs_that_are_known() {
     assert!(radius_m < 0.0025 / 1.1 && radius_m > 0.0025 / 1.2, "{radius_m}");
     let (thin, radius_m, _) = of(1e5, 0.0, 1e4);
     assert!((thin / (core::f32::consts::TAU * radius_m.powi(2) * 1.1e-3) - 1.0).abs() < 0.1, "{thin}");
+}
+
+/// What is derived of a contact by its parameters, where its own field and its share of the detector change too, is what it differs by for a step of them.
+#[test]
+fn moments_and_conductances_change_with_the_parameters_as_their_derivatives_say() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let loaded = |spot: Spot| {
+        let mut circuit = Circuit::EMPTY;
+        assert!(circuit.solve(&table, &[spot]));
+        circuit.loaded[0].clone()
+    };
+    for (at_m, sheets, ln_radius) in
+        [([0.004, -0.011], 0.3, 0.1), ([-0.0255, 0.009], 2.0, 0.3), ([0.012, 0.006], 20.0, -0.2)]
+    {
+        let begun = Spot { ln_radius, ..spot(at_m[0], at_m[1], sheets) };
+        let one = loaded(begun);
+        let scale = one.half_moment_by.iter().fold(0.0f32, |most, half| most.max(half.abs()));
+        let moved = |parameter: usize, way: f32| {
+            let mut spot = begun;
+            match parameter {
+                2 => spot.ln_ohm += way,
+                3 => spot.ln_radius += way,
+                axis => spot.at_m[axis] += table.head().radius_m * way,
+            }
+            loaded(spot)
+        };
+        for parameter in 0..PARAMETERS {
+            let [up, down] = [0.02, -0.02].map(|way| moved(parameter, way));
+            let half = 0.5 * (up.moment_s_m2 - down.moment_s_m2) / 0.04;
+            let off = (half - one.half_moment_by[parameter]).abs();
+            assert!(off < 0.03 * half.abs() + 0.003 * scale, "{at_m:?} {parameter}: {half} {:?}", one.half_moment_by);
+            // Of a light contact, whose crowding hardly changes: alone, and going together with its resistance.
+            let change = |parameter: usize| {
+                let [up, down] = [0.02, -0.02].map(|way| moved(parameter, way).conductance_s());
+                (up / down).ln() / 0.04
+            };
+            let with = |error: [f32; PARAMETERS]| {
+                one.conductance_variance(&table, table.head().radius_m, |i, j| error[i] * error[j])
+            };
+            let own = with([0.0; PARAMETERS]);
+            assert!(own > 0.0);
+            for with_ohm in if sheets < 1.0 { &[0.0, 1.0][..] } else { &[] } {
+                let mut error = [0.0; PARAMETERS];
+                (error[2], error[parameter]) = (*with_ohm, error[parameter] + 1.0);
+                let expected =
+                    error[parameter] * change(parameter) + if parameter == 2 { 0.0 } else { with_ohm * change(2) };
+                let found = (with(error) - own).sqrt();
+                assert!(
+                    (found - expected.abs()).abs() < 0.05 * expected.abs() + 0.01,
+                    "{parameter} {found} {expected}"
+                );
+            }
+        }
+    }
 }
 
 #[test]

@@ -7,10 +7,8 @@ use std::rc::Rc;
 use embedded_hal::delay::DelayNs;
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo_firmware::mux::Mux;
-use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, NoTouch, Parts, Sampler, Serial, TimedOut, Touch};
-use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, Frame, Hello, MAX_COMMAND, Request, encode_request,
-};
+use tactomo_firmware::{Adc, Board16, Chip, Identity, NoTouch, Parts, Sampler, Serial, TimedOut, Touch};
+use tactomo_protocol::{BoardMessage, BoardReceiver, Command, Frame, Hello, MAX_COMMAND, Request, encode_request};
 
 /// Time of one conversion of the test's converter (us).
 pub const CONVERSION_US: u64 = 10;

@@ -80,6 +80,45 @@ fn commands_are_obeyed_and_frames_go_on_while_a_search_is_under_way() {
     assert!(bench.scan(&mut simulation(&[]), 4).iter().all(|contacts| contacts.found.is_empty()));
 }
 
+/// Places that are looked at for a first contact, which is the longest piece of a search, and then those for one more in the other pieces that the step may do.
+const LOOKS_A_STEP: usize = 260 + 6 * 40;
+
+/// However long a search takes, a command is answered in the step after it came: behind a piece of the search and a row. The line is looked at after each look at contacts or
+/// at a place, so these are counted.
+#[test]
+fn a_command_waits_for_no_more_than_a_piece_of_a_search() {
+    let mut bench = Bench::new(finder(table_memory()));
+    bench.command(Command::Output(Output::Contacts));
+    bench.command(Command::Start);
+    bench.scan(&mut simulation(&[]), 80);
+    let pressed = [&[[0.011, -0.007], [-0.014, 0.009], [0.002, 0.019]][..], &[], &[[0.0, 0.01]], &[[0.011, -0.007]]];
+    let (mut most, mut is_searched) = (0, false);
+    for places_m in pressed {
+        bench.read(&mut simulation(&places_m.iter().map(|at_m| finger(*at_m)).collect::<Vec<_>>()));
+        for number in 0..16 * 20 {
+            let before = bench.outside.wire.borrow().pulls;
+            // A stop ends the search; it begins anew with the stream.
+            let command = match number % 100 {
+                98 => Command::Stop,
+                99 => Command::Start,
+                _ => Command::Hello,
+            };
+            let is_stop = command == Command::Stop;
+            let answers = bench.command(command);
+            let told = answers.iter().find_map(|message| match message {
+                BoardMessage::Hello(hello) => Some(!hello.is_streaming),
+                _ => None,
+            });
+            assert_eq!(told, Some(is_stop), "{answers:?}");
+            most = most.max(bench.outside.wire.borrow().pulls - before);
+            is_searched |= answers.iter().any(|message| {
+                matches!(message, BoardMessage::Contacts(contacts) if contacts.flags.has(ContactFlags::MISFIT))
+            });
+        }
+    }
+    assert!(is_searched && (100..=LOOKS_A_STEP).contains(&most), "{most}");
+}
+
 #[test]
 fn contacts_that_are_asked_for_once_more_begin_anew_with_rest() {
     let mut bench = Bench::new(finder(table_memory()));
@@ -228,10 +267,9 @@ fn boards_of_any_electrodes_grounds_and_floors_find_what_presses_where_it_is() {
         let [contact] = pressed.last().unwrap().found[..] else { panic!("{described}: {:?}", pressed.last()) };
         let off_m = contact.at_m().map(f64::from);
         assert!((off_m[0] - place_m[0]).hypot(off_m[1] - place_m[1]) < 5e-4, "{described}: {contact:?}");
+        // Where all readings are at the floor too.
         let after = bench.scan(&mut simulated_on(&detector, &[], &[]), 6);
-        // Where all readings are at the floor, none tells that a light contact has gone.
-        let is_seen = ground_v > 0.0 || adc.ranges[0].floor == 0;
-        assert!(!is_seen || after.last().unwrap().found.is_empty(), "{described}: {:?}", after.last());
+        assert!(after.last().unwrap().found.is_empty(), "{described}: {after:?}");
     }
 }
 

@@ -22,15 +22,7 @@ impl Trial {
         let drift = 9e-5 * (2.0 * random.f64() - 1.0);
         // The board's 32 bits wrap within the trial.
         let began_s = 4200.0 + 90.0 * random.f64();
-        Self {
-            clock: BoardClock::default(),
-            random,
-            drift,
-            began_s,
-            shortest_s: [2e-4, 2e-3],
-            chance_s: 1e-3,
-            tag: 0,
-        }
+        Self { clock: BoardClock::default(), random, drift, began_s, shortest_s: [2e-4, 2e-3], chance_s: 1e-3, tag: 0 }
     }
 
     fn board_us(&self, host_s: f64) -> u32 {
