@@ -16,8 +16,7 @@ thresholds! {
     /// exchanged and inverted electrodes more than 0.09.
     outside_share: f64 = 0.08;
     /// An answer of any method that leaves this share of the readings, in the root mean square, does not explain them. Of `square-60`, exact, as
-    /// described and as built, no method but `bsbl` leaves more than 0.16 under one to five contacts, lines and rings, whether its answer is right or
-    /// wrong, and `bsbl` in 1 of 100. Transposed tables leave more in 79 of 100 with `nonnegative` and in all with `bsbl`; with 0.5, 2 and 100. Other
+    /// described and as built, no right answer but those of `bsbl` leaves more than 0.16 under one to five contacts, and of these 1 to 3 in 100 do. Transposed tables leave more in 79 of 100 with `nonnegative` and in all with `bsbl`; with 0.5, 2 and 100. Other
     /// methods flag these by themselves or, negated ones, by `outside_share`.
     left_share: f64 = 0.2;
     /// Peaks of a linear image at least so high, over the highest, are contacts, and a contact is where the image is so high, over its peak.
