@@ -195,7 +195,7 @@ impl Rows {
             ));
         }
         let (wrong, what) = self.wrong;
-        if let Some(what) = what.clone().filter(|_| 2 * wrong > self.count) {
+        if let Some(what) = what.clone().filter(|_| 2 * wrong >= self.count) {
             return Err(what);
         }
         Ok(Text {
