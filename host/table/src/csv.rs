@@ -160,7 +160,9 @@ impl Rows {
             self.values.push(number);
         }
         if cells.len() != self.columns {
-            return Err(format!("line {line}: {} numbers, but {} columns before it", cells.len(), self.columns));
+            let what = format!("line {line}: {} numbers, but {} columns before it", cells.len(), self.columns);
+            let is_head = self.count == 0 && cells.len() > self.columns;
+            return Err(if is_head { format!("{what}: begin lines that are no part of the table with #") } else { what });
         }
         Ok(())
     }
@@ -275,6 +277,7 @@ mod tests {
         assert_eq!(parse("1,2\n3,much").unwrap_err(), "line 2, column 2: `much` is not a number");
         assert_eq!(parse("1,2\n\n3").unwrap_err(), "line 3: 1 numbers, but 2 columns before it");
         assert_eq!(parse("1,2\n3,,4").unwrap_err(), "line 2, column 2: `` is not a number");
+        assert!(parse("Operator: me\n1,2\n3,4").unwrap_err().contains("line 2: 2 numbers, but 1 columns before it: begin"));
         assert_eq!(parse("a,b\n").unwrap_err(), "there are no numbers");
         assert_eq!(parse("").unwrap_err(), "there are no numbers");
     }

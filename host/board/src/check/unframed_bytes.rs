@@ -60,7 +60,7 @@ impl UnframedBytes {
             return Vec::new();
         }
         let text = String::from_utf8_lossy(&self.bytes);
-        let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        let lines: Vec<&str> = text.split(['\n', '\r', '\0']).map(str::trim).filter(|line| !line.is_empty()).collect();
         let shown = |line: &&str| line.chars().take(SHOWN_CHARACTERS).flat_map(char::escape_debug).collect();
         lines[lines.len().saturating_sub(SHOWN)..].iter().map(shown).collect()
     }
@@ -95,7 +95,8 @@ impl UnframedBytes {
 impl fmt::Display for UnframedBytes {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} bytes came that were no message; {}", self.count, self.meaning())?;
-        self.lines().iter().try_for_each(|line| write!(f, "\n    | {line}"))
+        let lines = self.lines();
+        if lines.is_empty() { Ok(()) } else { write!(f, ". It said: \"{}\"", lines.join("\" \"")) }
     }
 }
 
@@ -115,7 +116,7 @@ mod tests {
         let unframed = unframed(text);
         assert!(unframed.meaning().contains("GPIO 0"));
         assert_eq!(unframed.lines().last().map(String::as_str), Some("waiting for download"));
-        assert!(unframed.to_string().contains("\n    | rst:0x1"), "{unframed}");
+        assert!(unframed.to_string().contains("\"rst:0x1"), "{unframed}");
     }
 
     #[test]
