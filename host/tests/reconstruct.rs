@@ -276,7 +276,11 @@ fn rows_that_are_no_numbers_are_left_out_of_a_log_and_counted_and_presses_by_row
     let file = folder.with("log.csv", rows.join("\n"));
     let (lines, messages) = told(&[&file, "--rest", "3"]);
     assert!(messages.contains("2 rows are left out, first: line 2, column 1: `ERROR`"), "{messages}");
-    assert_eq!((lines.len(), &lines[0]["frame"]), (1, &Value::from(3)), "the row that is left out is one of those at rest");
+    assert_eq!(
+        (lines.len(), &lines[0]["frame"]),
+        (1, &Value::from(3)),
+        "the row that is left out is one of those at rest"
+    );
     assert_found(&lines[0]);
     let out = folder.path("cal.toml");
     let refused = TACTOMO.run(&["calibrate", "force", &file, "--rest", "3", "--newtons", "1,2", "--out", &out]);
@@ -294,7 +298,10 @@ fn codes_are_asked_for_their_converter_and_no_other_unit_is_silent() {
     assert!(refused.status.code() == Some(1) && message.contains("--adc 10,5"), "{message}");
     let (lines, messages) = told(&[&file, "--rest", "4", "--adc", "10,5"]);
     let contact = &lines[1]["contacts"][0];
-    assert!(!messages.contains("warning") && (contact["x_m"].as_f64().unwrap() - 0.012).abs() < 1e-3, "{messages}{contact}");
+    assert!(
+        !messages.contains("warning") && (contact["x_m"].as_f64().unwrap() - 0.012).abs() < 1e-3,
+        "{messages}{contact}"
+    );
     let (lines, messages) = told(&[&file, "--rest", "4", "--unit", "mV"]);
     assert!(are_flagged(&lines) && messages.contains("a drive of 0.4") && messages.contains("--adc"), "{messages}");
 }

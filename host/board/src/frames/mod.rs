@@ -412,7 +412,9 @@ fn said(bytes: &[f64]) -> Result<Hello, String> {
     let wire: Vec<u8> = bytes.iter().take(MAX_WIRE).map(|&byte| byte as u8).collect();
     match BoardReceiver::default().receive(&mut &wire[..]) {
         Some(Ok(BoardMessage::Hello(hello))) => Ok(hello),
-        _ => Err(format!("its array {BOARD} is not what a board says of itself: export the recording again, or leave the array out")),
+        _ => Err(format!(
+            "its array {BOARD} is not what a board says of itself: export the recording again, or leave the array out"
+        )),
     }
 }
 

@@ -116,7 +116,10 @@ impl fmt::Display for RecordingLoss {
             count(self.corrupt, "message is corrupt", "messages are corrupt"),
             count(self.other_frames, "frame is of another board", "frames are of another board"),
             count(self.restarts, "restart of the board", "restarts of the board, the first").map(|restarts| {
-                format!("{restarts} at {:.3} s, from where times go on by when frames came", self.restarted_us as f64 * 1e-6)
+                format!(
+                    "{restarts} at {:.3} s, from where times go on by when frames came",
+                    self.restarted_us as f64 * 1e-6
+                )
             }),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();

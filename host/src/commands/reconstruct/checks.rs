@@ -81,19 +81,19 @@ impl Doubts {
         self.table.is_some()
     }
 
-    /// In words, with what to do.
-    pub fn words(&self) -> Vec<String> {
-        let table = self.table.map(|doubt| self.of_table(doubt));
+    /// What is wrong with a table as a whole, in words, with what to do.
+    pub fn of_table(&self) -> impl Iterator<Item = String> {
+        let table = self.table.map(|doubt| self.words(doubt));
         let floor = self.floor_v.map(|floor_v| {
             format!(
                 "no reading is below {floor_v:.3} V, though a grounded pad's is nearly 0: a converter with a floor? What is below it is not known then: give the \
                  recording itself, or what `tactomo export --to npz --fields readings` makes of it, which has the floor in it"
             )
         });
-        [table, floor, self.below.map(|below| self.of_below(below))].into_iter().flatten().collect()
+        [table, floor].into_iter().flatten()
     }
 
-    fn of_table(&self, doubt: TableDoubt) -> String {
+    fn words(&self, doubt: TableDoubt) -> String {
         match doubt {
             TableDoubt::Exchanged => "rows and columns seem to be exchanged, so no answer is right: a row has the readings of all electrodes while one is \
                                       grounded, one ground after the other; transpose each frame"
@@ -107,20 +107,24 @@ impl Doubts {
         }
     }
 
-    fn of_below(&self, Below { frames, lowest_v, is_negative }: Below) -> String {
+    /// What is wrong with the frames that were solved, in words, with what to do.
+    pub fn of_frames(&self) -> Option<String> {
+        let Below { frames, lowest_v, is_negative } = self.below?;
         let what = format!(
             "readings of {frames} frame{} are below the baseline, by up to {lowest_v:.3} V, which nothing that touches makes them",
             if frames == 1 { "" } else { "s" }
         );
-        match (is_negative, self.checks.rest) {
+        Some(match (is_negative, self.checks.rest) {
             (true, _) => format!("{what}: wrong sign? Where the reference is reversed, give the readings times -1"),
             (false, Some(rest)) => format!(
                 "{what}: something pressed in the first {rest} frames, which --rest takes for rest. Begin the file, and --rest, with frames in which nothing \
                  touches (--rest 0 takes nothing off)"
             ),
             (false, None) => {
-                format!("{what}: something pressed while the baseline was taken: give --rest a number of frames at the start in which nothing touches")
+                format!(
+                    "{what}: something pressed while the baseline was taken: give --rest a number of frames at the start in which nothing touches"
+                )
             }
-        }
+        })
     }
 }

@@ -151,7 +151,10 @@ impl Reader {
         let frames = Frames::of(file, input, detector)?;
         let given = input.rest.map(|rest| frames.among_first(rest));
         if let (Some(rest @ 1..), Some(0)) = (input.rest, given) {
-            bail!("{}: the first {rest} rows are to be the baseline, and none of them is of numbers", input.file.display());
+            bail!(
+                "{}: the first {rest} rows are to be the baseline, and none of them is of numbers",
+                input.file.display()
+            );
         }
         let baseline = match (&jacobian, given) {
             (Some(jacobian), None) => BaselineTracker::new(Arc::clone(jacobian), conversions),
@@ -161,9 +164,15 @@ impl Reader {
         let rest = Rest { baseline, given: given.unwrap_or(0) };
         let checks = TableChecks { unit: input.unit.unwrap_or(Unit::Volt), rest: input.rest };
         let doubts = match (&frames, detector) {
-            (Frames::Table { frames, board: None, .. }, Some(detector)) => checks.doubts(frames.as_slice(), rest.clone(), detector),
+            (Frames::Table { frames, board: None, .. }, Some(detector)) => {
+                checks.doubts(frames.as_slice(), rest.clone(), detector)
+            }
             _ => checks.none(),
         };
+        let left_out = frames.left_out().map(ToString::to_string);
+        for what in left_out.into_iter().chain(doubts.of_table()) {
+            message!("warning: {}: {what}", input.file.display());
+        }
         Ok(Self {
             path: input.file.to_owned(),
             frames,
@@ -229,12 +238,11 @@ impl Reader {
         Ok(None)
     }
 
-    /// Says what is missing in the file, and what is doubtful in it.
+    /// Says what was missing in a recording, and what is doubtful in the frames that were solved. What is wrong with a table as a whole is said when it
+    /// is opened.
     pub fn warn(&self) {
         let loss = self.frames.loss().filter(RecordingLoss::is_any).map(|loss| loss.to_string());
-        let left_out = self.frames.left_out().map(ToString::to_string);
-        let doubts = self.doubts.words();
-        for what in [loss, left_out].into_iter().flatten().chain(doubts) {
+        for what in [loss, self.doubts.of_frames()].into_iter().flatten() {
             message!("warning: {}: {what}", self.path.display());
         }
     }

@@ -99,7 +99,9 @@ impl FromStr for Codes {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
-            format!("the converter's bits, 1 to {MOST_BITS}, and its full scale in volts are needed, as in 10,5 of an Arduino of 5 V")
+            format!(
+                "the converter's bits, 1 to {MOST_BITS}, and its full scale in volts are needed, as in 10,5 of an Arduino of 5 V"
+            )
         };
         let (bits, full_scale) = text.split_once(',').ok_or_else(wrong)?;
         let bits = bits.trim().parse().ok().filter(|bits| (1..=MOST_BITS).contains(bits));
@@ -119,7 +121,11 @@ pub fn make_volts(frames: &mut [FileFrame], unit: Unit, detector: Option<&Detect
     if let Unit::Codes(codes) = unit
         && largest >= codes.count()
     {
-        return Err(format!("codes go up to {largest}, but a converter of {} bits has {} codes: give --adc its bits", codes.bits, codes.count()));
+        return Err(format!(
+            "codes go up to {largest}, but a converter of {} bits has {} codes: give --adc its bits",
+            codes.bits,
+            codes.count()
+        ));
     }
     let all = frames.iter_mut().flat_map(|frame| frame.volts.iter_mut().chain(&mut frame.measured_v));
     all.for_each(|value| *value *= unit.volts());
@@ -141,9 +147,9 @@ fn check(volts: impl IntoIterator<Item = f64>, unit: Unit, are_whole: bool, dete
             refused.largest_v, detector.name
         ),
         _ => {
-            // Thousandths of millivolts are not measured.
             refused.likely = Likely::Codes;
-            format!("{refused} Give {CODES}")
+            let microvolts = if are_whole { "" } else { "; microvolts divided by 1000 are --unit mV" };
+            format!("{refused} Give {CODES}{microvolts}")
         }
     })
 }
@@ -156,9 +162,8 @@ mod tests {
     fn readings_above_what_can_be_are_refused_with_a_hint() {
         let detector = Detector::default();
         assert_eq!(check([1.99], Unit::Volt, false, &detector), Ok(()));
-        let refused = |largest_v, unit, are_whole| {
-            check([0.0, largest_v], unit, are_whole, &detector).err().unwrap_or_default()
-        };
+        let refused =
+            |largest_v, unit, are_whole| check([0.0, largest_v], unit, are_whole, &detector).err().unwrap_or_default();
         let of_volts = |largest_v, are_whole| refused(largest_v, Unit::Volt, are_whole);
         assert!(of_volts(1500.5, false).contains("up to 1500.5 V"), "{}", of_volts(1500.5, false));
         assert!(of_volts(8.5, false).ends_with("are these millivolts? Give --unit mV"), "a light touch in millivolts");
@@ -173,7 +178,10 @@ mod tests {
     #[test]
     fn a_converter_is_its_bits_and_its_full_scale() {
         let codes: Codes = "10, 5".parse().unwrap();
-        assert_eq!((Unit::Codes(codes).volts(), Unit::Codes(codes).read(Detector::default()).adc.bits), (5.0 / 1024.0, 10));
+        assert_eq!(
+            (Unit::Codes(codes).volts(), Unit::Codes(codes).read(Detector::default()).adc.bits),
+            (5.0 / 1024.0, 10)
+        );
         for wrong in ["10", "0,5", "10,0", "25,5", "10,nan", "ten,5", "10,5,1"] {
             assert!(wrong.parse::<Codes>().is_err_and(|error| error.contains("10,5")), "{wrong}");
         }

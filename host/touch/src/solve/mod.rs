@@ -62,5 +62,7 @@ pub use self::pipeline::unexplained::below_rest_v;
 pub use self::pipeline::without::without;
 pub use self::problem::{LearnedElsewhere, Problem};
 pub use self::solver::{Followed, Hypothesis, Parts, Search, Solver, Tracker};
-pub use crate::learned::kernel::{Description, Kernel, Press, Presses, PressesError, Strength, TeachError, check_newtons};
+pub use crate::learned::kernel::{
+    Description, Kernel, Press, Presses, PressesError, Strength, TeachError, check_newtons,
+};
 pub use crate::learned::network::{Network, NetworkError};

@@ -74,7 +74,8 @@ fn other_drive(frames: &[&Readings], drive_v: f64, noise_v: f64) -> Option<Table
 
 /// Whether columns are grounded and rows are read.
 fn is_exchanged(frames: &[&Readings], drive_v: f64, noise_v: f64) -> bool {
-    let of_all = |turned: bool| frames.iter().filter_map(|frame| negative(frame, turned, drive_v, noise_v)).sum::<f64>();
+    let of_all =
+        |turned: bool| frames.iter().filter_map(|frame| negative(frame, turned, drive_v, noise_v)).sum::<f64>();
     let by_noise: usize = frames.iter().map(|frame| frame.electrodes()).sum();
     of_all(false) > EXCHANGED * (of_all(true) + by_noise as f64)
 }
@@ -111,7 +112,8 @@ mod tests {
         let press = |i: u32| {
             let conductance_s = lightest_s * f64::from(i).exp();
             let [x_m, y_m] = [(0.012, -0.008), (-0.02, 0.015), (0.02, 0.019)][i as usize % 3].into();
-            let fingers = [Contact::flat(x_m, y_m, 0.004, conductance_s), Contact::flat(-x_m, 0.0, 0.004, conductance_s)];
+            let fingers =
+                [Contact::flat(x_m, y_m, 0.004, conductance_s), Contact::flat(-x_m, 0.0, 0.004, conductance_s)];
             let impedance_ohm = model.impedance_ohm(&fingers[..1 + i as usize % 2]).unwrap();
             measurement.readings_v(Some(&impedance_ohm))
         };
