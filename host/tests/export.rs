@@ -59,6 +59,12 @@ fn readings_times_and_events_are_the_same_in_every_form() {
     assert!(!events.is_empty(), "the scene moves a pointer");
     assert_eq!(array(&arrays, "event_kind").values.len(), events.len());
 
+    // What the board says of its converters is in the archive: its frames are solved as the recording's are.
+    let solved = |file: &str| TACTOMO.lines(&["reconstruct", file, "--solver", "contacts", "--json"]);
+    for (from_recording, from_archive) in solved(&recording).iter().zip(solved(&archive)) {
+        assert_eq!(from_recording["contacts"], from_archive["contacts"]);
+    }
+
     let text = std::fs::read_to_string(table).unwrap();
     let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let heads = rows.next().unwrap();

@@ -30,6 +30,25 @@ fn lines(args: &[&str]) -> Vec<Value> {
     TACTOMO.lines(&[&["reconstruct"], args, &["--json"]].concat())
 }
 
+/// The objects that the command prints, and what it says beside them.
+fn told(args: &[&str]) -> (Vec<Value>, String) {
+    let output = TACTOMO.run(&[&["reconstruct"], args, &["--json"]].concat());
+    let [lines, messages] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    assert_eq!(output.status.code(), Some(0), "{messages}");
+    (lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect(), messages)
+}
+
+/// Whether all answers are flagged as misfits.
+fn are_flagged(lines: &[Value]) -> bool {
+    lines.iter().all(|line| line["flags"]["misfit"] == true)
+}
+
+/// Four frames at rest and two of a firm press (V).
+fn press_after_rest() -> Vec<Vec<f64>> {
+    let press = forward(&["--contact", "12,-8,4,1e-3"]);
+    [vec![vec![0.0; 256]; 4], vec![press; 2]].concat()
+}
+
 fn assert_found(line: &Value) {
     let contact = &line["contacts"][0];
     let [x_mm, y_mm] = ["x_m", "y_m"].map(|key| contact[key].as_f64().unwrap() * 1e3);
@@ -246,6 +265,70 @@ fn millivolts_are_refused_as_volts_and_read_as_what_they_are() {
     assert_found(&lines(&[&file, "--unit", "mV"])[1]);
 }
 
+#[test]
+fn rows_that_are_no_numbers_are_left_out_of_a_log_and_counted_and_presses_by_row_need_all() {
+    let folder = Folder::new("rows-that-are-no-numbers");
+    let press = readings();
+    let text = csv(&[vec![0.0; 256], vec![0.0; 256], vec![0.0; 256], press.clone(), press]);
+    let mut rows: Vec<&str> = text.lines().collect();
+    rows[1] = "ERROR";
+    rows[4] = &rows[4][..700];
+    let file = folder.with("log.csv", rows.join("\n"));
+    let (lines, messages) = told(&[&file, "--rest", "3"]);
+    assert!(messages.contains("2 rows are left out, first: line 2, column 1: `ERROR`"), "{messages}");
+    assert_eq!(
+        (lines.len(), &lines[0]["frame"]),
+        (1, &Value::from(3)),
+        "the row that is left out is one of those at rest"
+    );
+    assert_found(&lines[0]);
+    let out = folder.path("cal.toml");
+    let refused = TACTOMO.run(&["calibrate", "force", &file, "--rest", "3", "--newtons", "1,2", "--out", &out]);
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(1) && message.contains("number of their row"), "{message}");
+}
+
+#[test]
+fn codes_are_asked_for_their_converter_and_no_other_unit_is_silent() {
+    let folder = Folder::new("codes-are-asked-for-their-converter");
+    let codes = |frame: &Vec<f64>| frame.iter().map(|volts| (volts / 5.0 * 1024.0).round()).collect();
+    let file = folder.with("codes.csv", csv(&press_after_rest().iter().map(codes).collect::<Vec<_>>()));
+    let refused = TACTOMO.run(&["reconstruct", &file]);
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(1) && message.contains("--adc 10,5"), "{message}");
+    let (lines, messages) = told(&[&file, "--rest", "4", "--adc", "10,5"]);
+    let contact = &lines[1]["contacts"][0];
+    assert!(
+        !messages.contains("warning") && (contact["x_m"].as_f64().unwrap() - 0.012).abs() < 1e-3,
+        "{messages}{contact}"
+    );
+    let (lines, messages) = told(&[&file, "--rest", "4", "--unit", "mV"]);
+    assert!(are_flagged(&lines) && messages.contains("a drive of 0.4") && messages.contains("--adc"), "{messages}");
+}
+
+#[test]
+fn a_wrong_sign_a_press_at_rest_and_exchanged_rows_and_columns_are_told_and_flagged() {
+    let folder = Folder::new("what-no-touch-reads");
+    let frames = press_after_rest();
+    let table = |name: &str, frame: &dyn Fn(&Vec<f64>) -> Vec<f64>| {
+        folder.with(name, csv(&frames.iter().map(frame).collect::<Vec<_>>()))
+    };
+    let right = table("right.csv", &Vec::clone);
+    let negated = table("negated.csv", &|frame| frame.iter().map(|volts| -volts).collect());
+    let turned = table("turned.csv", &|frame| (0..256).map(|i| frame[i % 16 * 16 + i / 16]).collect());
+    let late = folder.with("late.csv", csv(&frames.iter().rev().cloned().collect::<Vec<_>>()));
+    for (file, rest, word) in [
+        (&negated, "4", "wrong sign?"),
+        (&late, "2", "something pressed in the first 2 frames"),
+        (&turned, "4", "rows and columns seem to be exchanged"),
+    ] {
+        let (lines, messages) = told(&[file, "--rest", rest]);
+        assert!(are_flagged(&lines) && messages.matches(word).count() == 1, "{word}: {messages}");
+    }
+    let (lines, messages) = told(&[&right, "--rest", "4"]);
+    assert!(!messages.contains("warning") && !are_flagged(&lines), "{messages}");
+}
+
 /// A recording of a board's Hello and of still frames with these numbers, one a chunk.
 fn recording_of(folder: &Folder, name: &str, numbers: impl Iterator<Item = u16>) -> String {
     let file = folder.path(name);
@@ -266,13 +349,7 @@ fn recording_of(folder: &Folder, name: &str, numbers: impl Iterator<Item = u16>)
 #[test]
 fn frames_missing_in_a_recording_are_reported() {
     let folder = Folder::new("frames-missing-in-a-recording-are-reported");
-    let run = |file: &str| {
-        let output = TACTOMO.run(&["reconstruct", file, "--json"]);
-        assert_eq!(output.status.code(), Some(0));
-        let lines: Vec<Value> =
-            String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-        (lines, String::from_utf8(output.stderr).unwrap())
-    };
+    let run = |file: &str| told(&[file]);
     let (_, messages) = run(&recording_of(&folder, "whole.tactomo", 0..60));
     assert!(!messages.contains("warning"), "{messages}");
     let (lines, messages) = run(&recording_of(&folder, "gap.tactomo", (0..40).chain(340..360)));
@@ -336,6 +413,7 @@ fn wrong_files_are_told() {
     let mut nan = vec![0.1; 256];
     nan[3 * 16 + 5] = f64::NAN;
     let few = folder.with("few.csv", some(vec![0.1; 255]));
+    let good = folder.with("good.csv", some(readings()));
     let nan = folder.with("nan.csv", some(nan));
     let text = folder.with("letter.csv", "Dear reader,\nhow are you?");
     let typo =
@@ -349,7 +427,7 @@ fn wrong_files_are_told() {
     };
     for (file, expected) in [
         (few.as_str(), "has 255 readings a frame, but the detector square-60 with its 16 electrodes needs 256"),
-        (&nan, "frame 1: the reading of electrode 5 with electrode 3 grounded is not a finite number"),
+        (&nan, "1 of 2 rows are no readings: row 2, column 54 is not a finite number"),
         (&text, "line 2, column 1: `how are you?` is not a number"),
         (&typo, "line 1, column 3: `O.1` is not a number; to name the columns"),
         (&broken, "not an NPZ file"),
@@ -361,6 +439,6 @@ fn wrong_files_are_told() {
     }
     assert!(told(&folder.path(""), &[]).contains("cannot read"));
     assert!(told(&few, &["--out", "contacts.xls"]).contains("needs 256"));
-    assert!(told(&nan, &["--out", "contacts.xls"]).contains(".csv, .npz, .json or .jsonl"));
-    assert!(told(&nan, &["--solver", "contacts", "--lambda", "0.1"]).contains("has no lambda: leave out --lambda"));
+    assert!(told(&good, &["--out", "contacts.xls"]).contains(".csv, .npz, .json or .jsonl"));
+    assert!(told(&good, &["--solver", "contacts", "--lambda", "0.1"]).contains("has no lambda: leave out --lambda"));
 }

@@ -252,8 +252,11 @@ impl Out {
                 mcap.finish().map_err(|error| file.failed(error))?;
                 Ok(file.finish()?)
             }
-            // What has a mesh in it is of one detector.
-            Self::Table(writer) => writer.finish(recordings.first().and_then(Recording::mesh)),
+            // What has a mesh or a board in it is of one detector.
+            Self::Table(writer) => {
+                let of = recordings.first();
+                writer.finish(of.and_then(Recording::mesh), of.and_then(Recording::board))
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `tactomo reconstruct`: touch from readings in a file.
 
 mod by_board;
+mod checks;
 mod opened;
 pub mod reader;
 pub mod units;
@@ -15,7 +16,7 @@ use tactomo::schema::FrameReport;
 use tactomo::solve::{Lambda, Method};
 
 use self::reader::{Input, Reader, Taught};
-use self::units::Unit;
+use self::units::UnitArgs;
 use self::writer::Writer;
 use tactomo_cli::choice::{self, DetectorArgs, Model};
 use tactomo_cli::output::message;
@@ -30,6 +31,7 @@ use tactomo_cli::output::message;
 /// Examples:
 ///   tactomo reconstruct touch.tactomo --solver nonlinear --json
 ///   tactomo reconstruct readings.csv --unit mV --detector square-60 --solver tikhonov --lambda gcv
+///   tactomo reconstruct arduino.csv --adc 10,5 --rest 10
 ///   tactomo reconstruct readings.npz --rest 10 --out contacts.csv
 ///   tactomo reconstruct touch.tactomo --solver tikhonov --images --out images.npz
 ///   tactomo reconstruct touch.csv --learned mine.safetensors --json
@@ -61,9 +63,8 @@ pub struct Args {
     /// table, none]
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     rest: Option<u32>,
-    /// Unit of the readings in a table [default: V]
-    #[arg(long, value_name = "V|mV")]
-    unit: Option<Unit>,
+    #[command(flatten)]
+    unit: UnitArgs,
     /// Writes images too, of solvers that make images
     #[arg(long)]
     images: bool,
@@ -87,7 +88,7 @@ impl Args {
             lambda: self.lambda,
             taught,
             rest: self.rest,
-            unit: self.unit,
+            unit: self.unit.given(),
             force: None,
             uncorrected: false,
             keeps_found: true,
@@ -123,14 +124,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             return Ok(());
         }
     }
-    writer.finish(reader.mesh())?;
+    writer.finish(reader.mesh(), None)?;
     message!("{}", sentence(&reader, &mut times_us));
     if let Some(notice) = reader.notice() {
         message!("{notice}");
     }
-    if let Some(losses) = reader.losses() {
-        message!("warning: {losses}");
-    }
+    reader.warn();
     Ok(())
 }
 

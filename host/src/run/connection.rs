@@ -3,6 +3,7 @@
 use std::io;
 use std::time::{Duration, Instant};
 
+use tactomo_board::check::UnframedBytes;
 use tactomo_board::link::Link;
 use tactomo_board::record::PlainPackets;
 use tactomo_board::session::{self, GreetError, Session};
@@ -19,6 +20,8 @@ pub(super) struct Connection {
     /// Bytes pass it before they are kept and received.
     pub plain: PlainPackets,
     pub receiver: BoardReceiver,
+    /// What came before the board said Hello.
+    unframed: UnframedBytes,
     opened: Instant,
     /// Stretches of junk until the board said Hello, in answer to what it was asked; `None` before.
     pub junk: Option<u64>,
@@ -36,6 +39,7 @@ impl Connection {
             session: Session::new(settings),
             plain: PlainPackets::default(),
             receiver: BoardReceiver::default(),
+            unframed: UnframedBytes::default(),
             opened: Instant::now(),
             junk: None,
             counted: 0,
@@ -46,7 +50,11 @@ impl Connection {
     /// Sends what is due and reads what has come; returns the number of bytes.
     pub fn exchange(&mut self, link: &mut dyn Link, buffer: &mut [u8]) -> io::Result<usize> {
         self.session.transmit(link, self.receiver.counters().corrupt)?;
-        link.read(buffer)
+        let count = link.read(buffer)?;
+        if self.junk.is_none() {
+            self.unframed.add(&buffer[..count]);
+        }
+        Ok(count)
     }
 
     /// Whether no board has said Hello in time, and what is wrong.
@@ -54,8 +62,7 @@ impl Connection {
         if self.junk.is_some() || self.opened.elapsed() < PATIENCE {
             return None;
         }
-        let junk_bytes = self.receiver.counters().dropped_bytes;
-        let silent = GreetError::Silent { seconds: PATIENCE.as_secs(), junk_bytes };
+        let silent = GreetError::Silent { seconds: PATIENCE.as_secs(), unframed: self.unframed.clone() };
         Some(self.session.stray().map_or(silent, |(named, sent)| GreetError::Stray { named, sent }))
     }
 

@@ -222,16 +222,6 @@ pub struct Summary {
     pub learned: Option<LearnedInUse>,
 }
 
-/// What to do where a port has no board.
-fn advice(error: &GreetError) -> &'static str {
-    match error {
-        GreetError::Silent { .. } => {
-            ": is this the board's port, is the board flashed, and its baud rate the usual one? `tactomo ports` lists ports and who answers"
-        }
-        _ => "",
-    }
-}
-
 /// Why the run cannot go on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -240,7 +230,7 @@ pub enum LiveError {
     #[error(transparent)]
     Source(#[from] SourceError),
     /// The board cannot be talked to.
-    #[error("{link}: {error}{}", advice(error))]
+    #[error("{link}: {error}")]
     Greet {
         /// Name of the link.
         link: String,

@@ -2,7 +2,7 @@
 //!
 //! A column is no channel if its name, in any case,
 //! - counts or tells the time: it is empty, or its last word is `id`, `index`, `number`, `row`, `frame`, `sequence`, `press`, `trial`, `time`,
-//!   `timestamp` or `date`; or it begins with `Unnamed`, as pandas calls an index;
+//!   `timestamp`, `date` or `datetime`; or it begins with `Unnamed`, as pandas calls an index;
 //! - ends in a unit that no reading has, behind another word: `time_s`, `x_mm`, `Fz [N]`;
 //! - tells a pose or a force in a word without a number: `Fz`, `rx`, `roll`, `robot_pose_x`.
 //!
@@ -10,8 +10,10 @@
 //! `joint6`).
 
 /// Words of names that count or tell the time.
-const COUNTS: [&str; 11] =
-    ["id", "index", "number", "row", "frame", "sequence", "press", "trial", "time", "timestamp", "date"];
+const COUNTS: [&str; 12] =
+    ["id", "index", "number", "row", "frame", "sequence", "press", "trial", "time", "timestamp", "date", "datetime"];
+/// Words of names whose column has dates or times of day, which need not be numbers.
+const DATES: [&str; 7] = ["time", "timestamp", "date", "datetime", "zeit", "uhrzeit", "datum"];
 /// Units that no reading has: of time, length, force, pressure, angle and temperature.
 const UNITS: [&str; 16] =
     ["s", "ms", "us", "ns", "m", "mm", "um", "n", "mn", "g", "kg", "pa", "kpa", "deg", "rad", "degc"];
@@ -91,6 +93,12 @@ fn may_be_channel(name: &str) -> bool {
     let has_unit = words.len() > 1 && UNITS.contains(last);
     let is_else = stem(name).is_none() && words.iter().any(|word| ELSE.contains(word));
     !(lower.starts_with("unnamed") || has_unit || COUNTS.contains(last) || is_else)
+}
+
+/// Whether a column of such a name has dates or times of day.
+pub fn is_date(name: &str) -> bool {
+    let lower = name.to_ascii_lowercase();
+    lower.split(|c: char| !c.is_alphanumeric()).any(|word| DATES.contains(&word))
 }
 
 /// A name without its numbers, if it has some.

@@ -1,7 +1,7 @@
 //! Columns of numbers in text.
 //!
 //! Cells are separated by commas, semicolons, tabs or blanks, whichever makes numbers of the first lines; but for commas, decimals may have
-//! commas too. A first line without any number names the columns. Empty lines, lines that begin with `#`, a line `sep=;` as Excel writes it, and a
+//! commas too. A column that is called a date or a time may have text, which is no number. A first line without any number names the columns. Empty lines, lines that begin with `#`, a line `sep=;` as Excel writes it, and a
 //! separator at the end of every line are left out.
 
 use std::io::{self, Write};
@@ -9,6 +9,7 @@ use std::io::{self, Write};
 use ::csv::{ErrorKind, ReaderBuilder, StringRecord, Trim};
 
 use super::Array;
+use super::channels::is_date;
 
 /// Separators, in the order in which they are tried: where commas are decimal points, lines have both.
 const MARKS: [u8; 4] = [b';', b'\t', b',', b' '];
@@ -124,6 +125,8 @@ struct Rows {
     values: Vec<f64>,
     /// Rows that are wrong, and what is with the first of them.
     wrong: (usize, Option<String>),
+    /// Whether the first row is.
+    begins_wrong: bool,
     /// The first cells whose decimals have a point, and a comma.
     decimals: [Option<String>; 2],
 }
@@ -142,6 +145,7 @@ impl Rows {
             self.values.truncate(before);
             self.values.resize(before + self.columns, f64::NAN);
             self.wrong.0 += 1;
+            self.begins_wrong |= self.count == 0;
             self.wrong.1.get_or_insert(what);
         }
         self.count += 1;
@@ -150,8 +154,10 @@ impl Rows {
 
     fn add_numbers(&mut self, line: u64, cells: &[&str]) -> Result<(), String> {
         for (column, cell) in cells.iter().enumerate() {
+            let is_date = || self.names.get(column).is_some_and(|name| is_date(name)).then_some(f64::NAN);
             let number = number(cell, self.has_decimal_commas)
-                .ok_or_else(|| format!("line {line}, column {}: `{}` is not a number", column + 1, shortened(cell)))?;
+                .or_else(is_date)
+                .ok_or_else(|| format!("line {line}, column {}: {}", column + 1, no_number(cell)))?;
             for (decimals, mark) in self.decimals.iter_mut().zip(['.', ',']) {
                 if decimals.is_none() && cell.contains(mark) {
                     *decimals = Some(format!("{} in line {line}", shortened(cell)));
@@ -179,9 +185,9 @@ impl Rows {
         }
         let wrong = cells.iter().position(|cell| !is_number(cell)).unwrap_or_default();
         Err(format!(
-            "line {line}, column {}: `{}` is not a number; to name the columns, the first line must hold names only",
+            "line {line}, column {}: {}; to name the columns, the first line must hold names only",
             wrong + 1,
-            shortened(cells[wrong])
+            no_number(cells[wrong])
         ))
     }
 
@@ -195,8 +201,10 @@ impl Rows {
             ));
         }
         let (wrong, what) = self.wrong;
-        if let Some(what) = what.clone().filter(|_| 2 * wrong > self.count) {
-            return Err(what);
+        if let Some(what) = what.clone().filter(|_| 2 * wrong >= self.count) {
+            let has_head = self.begins_wrong && !self.names.is_empty();
+            let head = if has_head { "; begin lines that are no part of the table with #" } else { "" };
+            return Err(what + head);
         }
         Ok(Text {
             names: self.names,
@@ -204,6 +212,14 @@ impl Rows {
             wrong: what,
         })
     }
+}
+
+/// Why a cell is no number.
+fn no_number(cell: &str) -> String {
+    let without: String = cell.chars().filter(|c| !",.' ".contains(*c)).collect();
+    let has_thousands = without.len() + 1 < cell.len() && without.parse::<f64>().is_ok();
+    let thousands = if has_thousands { ": write it without separators of thousands" } else { "" };
+    format!("`{}` is not a number{thousands}", shortened(cell))
 }
 
 /// The beginning of a cell, for messages.
@@ -275,6 +291,12 @@ mod tests {
         assert_eq!(parse("1,2\n3,much").unwrap_err(), "line 2, column 2: `much` is not a number");
         assert_eq!(parse("1,2\n\n3").unwrap_err(), "line 3: 1 numbers, but 2 columns before it");
         assert_eq!(parse("1,2\n3,,4").unwrap_err(), "line 2, column 2: `` is not a number");
+        for text in ["Operator: me\n1,2\n3,4", "Operator: me\nDate: today\n1,2\n3,4"] {
+            assert!(parse(text).unwrap_err().ends_with("begin lines that are no part of the table with #"), "{text}");
+        }
+        for text in ["\"1,030.5\",\"2,000.0\"\n", "1.030,5;2.000,0\n", "1'030.5;2\n"] {
+            assert!(parse(text).unwrap_err().contains("separators of thousands"), "{text}");
+        }
         assert_eq!(parse("a,b\n").unwrap_err(), "there are no numbers");
         assert_eq!(parse("").unwrap_err(), "there are no numbers");
     }
@@ -308,6 +330,13 @@ mod tests {
         assert_eq!(is_wrong, [false, true, false, false, true]);
         assert_eq!(text.wrong.as_deref(), Some("line 3, column 2: `ERROR` is not a number"));
         assert!(super::parse("1,2\nx,y\n3,z\n").is_err(), "most are wrong");
+    }
+
+    #[test]
+    fn dates_are_no_numbers_and_no_mistakes() {
+        let (names, rows) = parse("Datum/Zeit;ch0\n2026-11-28 12:00:01;0,5\n2026-11-28 12:00:02;0,25\n").unwrap();
+        assert_eq!((&*names[0], rows.values[1], rows.values[3]), ("Datum/Zeit", 0.5, 0.25));
+        assert!(rows.values[0].is_nan() && parse("ch0;ch1\n12:00:01;0,5\n").is_err());
     }
 
     #[test]

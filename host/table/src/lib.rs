@@ -119,6 +119,13 @@ impl Table {
         Ok((Self::Columns { names, rows }, wrong))
     }
 
+    /// Takes an array out, by its name.
+    pub fn take(&mut self, wanted: &str) -> Option<Array> {
+        let Self::Arrays(arrays) = self else { return None };
+        let index = arrays.iter().position(|(name, _)| name == wanted)?;
+        Some(arrays.remove(index).1)
+    }
+
     /// The array of a name, or the lone one; of columns with names those that are [channels].
     ///
     /// # Errors

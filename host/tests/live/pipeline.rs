@@ -105,7 +105,7 @@ fn a_board_that_says_nothing_of_use_is_given_up() {
     let mut link = Says(b"ets Jun  8 2016 00:22:57\r\n\0".to_vec());
     let deadline = std::time::Instant::now() + Duration::from_millis(50);
     let error = greet(&mut link, deadline).unwrap_err();
-    assert!(matches!(error, GreetError::Silent { junk_bytes: 26, .. }), "{error:?}");
+    assert!(error.to_string().contains("\"ets Jun  8 2016 00:22:57"), "{error}");
 }
 
 #[test]

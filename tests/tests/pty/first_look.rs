@@ -23,7 +23,7 @@ fn what_a_boot_loader_says_is_shown_and_explained() {
     board.raw(BOOT_TEXT);
     board.raw(b"waiting for download\r\n");
     let message = looking.join().unwrap().err().unwrap().to_string();
-    for part in ["no board said Hello", "rst:0x1 (POWERON_RESET)", "| waiting for download", "boot pin"] {
+    for part in ["no board said Hello", "rst:0x1 (POWERON_RESET)", "\"waiting for download\"", "boot pin"] {
         assert!(message.contains(part), "{part} is missing in: {message}");
     }
 }

@@ -4,8 +4,11 @@ use std::fmt;
 
 /// Bytes that are kept: a chip's boot text and some lines of a program's.
 const KEPT: usize = 4096;
-/// Lines of text that are shown.
+/// Lines of text that are shown, and characters of each.
 const SHOWN: usize = 4;
+const SHOWN_CHARACTERS: usize = 80;
+/// What the boot loader of the ESP32 family says at each start.
+const START: &str = "rst:0x";
 /// Share of the bytes from which on they count as text: a wrong baud rate gives bytes of all values, of which 38 % are printable.
 const TEXT_SHARE: f64 = 0.8;
 
@@ -51,16 +54,15 @@ impl UnframedBytes {
         printable as f64 > TEXT_SHARE * self.bytes.len() as f64
     }
 
-    /// The last lines of it, if it is text.
+    /// The last lines of it, if it is text: their beginnings, with what cannot be printed escaped.
     pub fn lines(&self) -> Vec<String> {
         if !self.is_text() {
             return Vec::new();
         }
         let text = String::from_utf8_lossy(&self.bytes);
-        let is_shown = |character: &char| !character.is_control();
-        let lines: Vec<String> = text.lines().map(|line| line.chars().filter(is_shown).collect()).collect();
-        let lines: Vec<String> = lines.into_iter().filter(|line: &String| !line.trim().is_empty()).collect();
-        lines[lines.len().saturating_sub(SHOWN)..].to_vec()
+        let lines: Vec<&str> = text.split(['\n', '\r', '\0']).map(str::trim).filter(|line| !line.is_empty()).collect();
+        let shown = |line: &&str| line.chars().take(SHOWN_CHARACTERS).flat_map(char::escape_debug).collect();
+        lines[lines.len().saturating_sub(SHOWN)..].iter().map(shown).collect()
     }
 
     /// What it means and what to do.
@@ -69,10 +71,14 @@ impl UnframedBytes {
         if let Some((_, meaning)) = KNOWN.iter().find(|(known, _)| text.contains(known)) {
             return meaning;
         }
+        if text.matches(START).count() > 1 {
+            return "the chip starts again and again: its program fails (flash the firmware with `tactomo board flash`), its supply is too weak, or \
+                    something holds its reset";
+        }
         match (self.count, self.is_text()) {
             (0, _) => {
-                "not one byte came: is this the board's port, has the board power, does its cable carry data, and is the firmware on it \
-                 (`tactomo board flash`)?"
+                "not one byte came: is this the board's port (`tactomo ports` lists them), has the board power, does its cable carry data, and is \
+                 the firmware on it (`tactomo board flash`)?"
             }
             (_, true) => {
                 "text came, and no Hello: another program runs on the board, or it is still starting. Flash the firmware with `tactomo board \
@@ -89,7 +95,8 @@ impl UnframedBytes {
 impl fmt::Display for UnframedBytes {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} bytes came that were no message; {}", self.count, self.meaning())?;
-        self.lines().iter().try_for_each(|line| write!(f, "\n    | {line}"))
+        let lines = self.lines();
+        if lines.is_empty() { Ok(()) } else { write!(f, ". It said: \"{}\"", lines.join("\" \"")) }
     }
 }
 
@@ -109,7 +116,17 @@ mod tests {
         let unframed = unframed(text);
         assert!(unframed.meaning().contains("GPIO 0"));
         assert_eq!(unframed.lines().last().map(String::as_str), Some("waiting for download"));
-        assert!(unframed.to_string().contains("\n    | rst:0x1"), "{unframed}");
+        assert!(unframed.to_string().contains("\"rst:0x1"), "{unframed}");
+    }
+
+    #[test]
+    fn a_chip_that_starts_for_ever_is_told_and_long_lines_of_any_text_are_bounded_and_escaped() {
+        let boots = unframed(&b"\r\nets Jun  8 2016\r\nrst:0x10 (RTCWDT_RTC_RESET),boot:0x13\r\n".repeat(20));
+        assert!(boots.meaning().contains("again and again"), "{boots}");
+        let text = unframed(format!("adc \u{1b}[2J{}\n", "1023,".repeat(400)).as_bytes());
+        let [line] = &text.lines()[..] else { panic!("{text}") };
+        assert!(line.starts_with("adc \\u{1b}[2J1023,") && line.len() < 100, "{line}");
+        assert!(text.meaning().contains("another program"));
     }
 
     #[test]

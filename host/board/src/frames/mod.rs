@@ -9,18 +9,24 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use tactomo_protocol::{Contacts, Hello};
+use tactomo_protocol::{BoardMessage, BoardReceiver, Contacts, EncodeError, Hello, MAX_WIRE, encode_board};
 
 pub use self::recorded::{Recorded, RecordingLoss};
 pub use self::survey::Survey;
 use crate::baseline::BaselineTracker;
 use crate::clock::Delay;
+use crate::measured::Volts;
 use crate::record::{self, OtherProtocol, RecordError};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_table::{Array, Table, TableError, file};
 
 /// Names that an array of readings may have in an NPZ file.
 const READINGS: [&str; 3] = ["readings_v", "readings", "volts"];
+/// Name of the array, in an NPZ file of a recording's frames, with the message by which the board said who it is, byte by byte: its drive, its
+/// converters and their floors.
+pub const BOARD: &str = "board_hello";
+/// Name of the array with the frames' times (s).
+const TIMES: &str = "time_s";
 
 /// Frames of a file, one after the other.
 pub enum FrameFile {
@@ -35,8 +41,12 @@ pub struct Rows {
     rows: std::vec::IntoIter<f64>,
     channels: usize,
     /// Frames that were read, those that are left out included.
-    read: u64,
+    read: usize,
     left_out: LeftOut,
+    /// The board that they are of, if the file says, and what its readings mean.
+    board: Option<Box<(Hello, Volts)>>,
+    /// Time of each (s), if the file says.
+    times_s: Vec<f64>,
 }
 
 /// Rows of a table that were left out, because they are no numbers.
@@ -50,8 +60,8 @@ pub struct LeftOut {
 
 impl fmt::Display for LeftOut {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let rows = if self.count == 1 { "row is" } else { "rows are" };
-        write!(f, "{} {rows} left out: {}", self.count, self.first.as_deref().unwrap_or("no numbers"))
+        let rows = if self.count == 1 { "row is left out" } else { "rows are left out, first" };
+        write!(f, "{} {rows}: {}", self.count, self.first.as_deref().unwrap_or("no numbers"))
     }
 }
 
@@ -207,9 +217,18 @@ impl FrameFile {
             return Ok(Self::Recording(Box::new(Recorded::open(path)?)));
         }
         let shape = |what| FramesError::Shape { path: path.to_owned(), what };
-        let (table, wrong) = Table::read_log(path)?;
+        let (mut table, wrong) = Table::read_log(path)?;
+        let [board, times] = [BOARD, TIMES].map(|name| table.take(name));
+        let board = board.map(|bytes| said(&bytes.values)).transpose().map_err(shape)?;
         let rows = readings(table).and_then(|array| Rows::of(array, expected)).map_err(shape)?;
-        Ok(Self::Table(Rows { left_out: LeftOut { count: 0, first: wrong }, ..rows }))
+        let rows = Rows {
+            left_out: LeftOut { count: 0, first: wrong },
+            board: board.map(|board| Box::new((board.clone(), Volts::of(&board)))),
+            times_s: times.map(|times| times.values).unwrap_or_default(),
+            ..rows
+        };
+        rows.check().map_err(shape)?;
+        Ok(Self::Table(rows))
     }
 
     /// Rows of a table that were left out so far.
@@ -220,11 +239,11 @@ impl FrameFile {
         }
     }
 
-    /// The board that a recording was taken from.
+    /// The board that the frames were taken from: that of a recording, or of a table that says so.
     pub fn board(&self) -> Option<&Hello> {
         match self {
             Self::Recording(recorded) => Some(recorded.board()),
-            Self::Table(_) => None,
+            Self::Table(rows) => rows.board.as_ref().map(|board| &board.0),
         }
     }
 
@@ -244,10 +263,13 @@ impl FrameFile {
         }
     }
 
-    /// Tells readings of a recording above a ground that is lifted by so much (V); those of a table are as they are.
+    /// Tells readings of a recording above a ground that is lifted by so much (V). Those of a table are that already.
     pub fn set_ground(&mut self, ground_v: f64) {
-        if let Self::Recording(recorded) = self {
-            recorded.set_ground(ground_v);
+        match self {
+            Self::Recording(recorded) => recorded.set_ground(ground_v),
+            Self::Table(rows) => {
+                rows.board.iter_mut().for_each(|board| board.1 = board.1.clone().above(ground_v));
+            }
         }
     }
 
@@ -294,7 +316,38 @@ impl Rows {
                 array.shape_text()
             ));
         }
-        Ok(Self { rows: array.values.into_iter(), channels, read: 0, left_out: LeftOut::default() })
+        Ok(Self {
+            rows: array.values.into_iter(),
+            channels,
+            read: 0,
+            left_out: LeftOut::default(),
+            board: None,
+            times_s: Vec::new(),
+        })
+    }
+
+    /// Why a frame is none (the reading that is no number), if it is none. Where the board is known, what is no number was not read.
+    fn wrong(&self, volts: &[f64]) -> Option<usize> {
+        let wrong = volts.iter().position(|volts| !volts.is_finite());
+        wrong.filter(|_| self.board.is_none() || !volts.iter().any(|volts| volts.is_finite()))
+    }
+
+    /// Checks that more frames are right than wrong, and of the board that the file names.
+    fn check(&self) -> Result<(), String> {
+        let frames = || self.rows.as_slice().chunks_exact(self.channels);
+        let wrong = frames().filter(|frame| self.wrong(frame).is_some()).count();
+        if 2 * wrong >= frames().len() {
+            let first = frames().enumerate().find_map(|(row, frame)| Some(place(row + 1, self.wrong(frame)?)));
+            let first = self.left_out.first.clone().or(first).unwrap_or_default();
+            return Err(format!("{wrong} of {} rows are no readings: {first}", frames().len()));
+        }
+        match &self.board {
+            Some(board) if usize::from(board.0.electrodes).pow(2) != self.channels => Err(format!(
+                "its board has {} electrodes, but its frames {} readings",
+                board.0.electrodes, self.channels
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// The next frame of numbers alone.
@@ -306,24 +359,64 @@ impl Rows {
                 return None;
             }
             self.read += 1;
-            if let Some(channel) = volts.iter().position(|volts| !volts.is_finite()) {
-                let place = || format!("row {}, column {} is not a finite number", self.read, channel + 1);
-                self.left_out.first.get_or_insert_with(place);
+            if let Some(channel) = self.wrong(&volts) {
+                self.left_out.first.get_or_insert_with(|| place(self.read, channel));
                 (self.left_out.count, lost_before) = (self.left_out.count + 1, lost_before + 1);
                 continue;
             }
-            return Some(FileFrame {
-                time_s: None,
-                delay: None,
-                arrived_s: None,
-                sequence: None,
-                lost_before,
-                measured_v: volts.clone(),
-                volts,
-                says: Vec::new(),
-                found: None,
-            });
+            return Some(FileFrame { lost_before, ..self.frame(volts) });
         }
+    }
+
+    /// The frame that was read last.
+    fn frame(&self, mut measured_v: Vec<f64>) -> FileFrame {
+        let (mut volts, mut says) = (measured_v.clone(), Vec::new());
+        if let Some(board) = &self.board {
+            let n = measured_v.len().isqrt();
+            let unread: Vec<bool> = measured_v.iter().map(|volts| !volts.is_finite()).collect();
+            measured_v.iter_mut().filter(|volts| !volts.is_finite()).for_each(|volts| *volts = 0.0);
+            if let Some(measured) = Readings::new(n, measured_v.clone()) {
+                let used = board.1.used(measured.hiding(|g, e| unread[g * n + e]));
+                (volts, says) = (used.volts().to_vec(), used.all_say().to_vec());
+            }
+        }
+        FileFrame {
+            time_s: self.times_s.get(self.read - 1).copied().filter(|time_s| time_s.is_finite()),
+            delay: None,
+            arrived_s: None,
+            sequence: None,
+            lost_before: 0,
+            volts,
+            measured_v,
+            says,
+            found: None,
+        }
+    }
+}
+
+/// What is wrong with a reading that is no number.
+fn place(row: usize, channel: usize) -> String {
+    format!("row {row}, column {} is not a finite number", channel + 1)
+}
+
+/// What a board says of itself, as the array [`BOARD`] has it: its message on the wire.
+///
+/// # Errors
+/// If it is longer than a message is.
+pub fn hello_bytes(hello: &Hello) -> Result<Vec<i64>, EncodeError> {
+    let mut wire = [0; MAX_WIRE];
+    let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire)?;
+    Ok(wire[..length].iter().map(|&byte| i64::from(byte)).collect())
+}
+
+/// What a board has said of itself.
+fn said(bytes: &[f64]) -> Result<Hello, String> {
+    let wire: Vec<u8> = bytes.iter().take(MAX_WIRE).map(|&byte| byte as u8).collect();
+    match BoardReceiver::default().receive(&mut &wire[..]) {
+        Some(Ok(BoardMessage::Hello(hello))) => Ok(hello),
+        _ => Err(format!(
+            "its array {BOARD} is not what a board says of itself: export the recording again, or leave the array out"
+        )),
     }
 }
 
@@ -389,7 +482,7 @@ mod tests {
         let frames: Vec<_> =
             std::iter::from_fn(|| rows.next_frame()).map(|frame| (frame.volts[0], frame.lost_before)).collect();
         assert_eq!(frames, [(1.0, 0), (7.0, 2)]);
-        assert_eq!(rows.left_out.to_string(), "2 rows are left out: row 2, column 1 is not a finite number");
+        assert_eq!(rows.left_out.to_string(), "2 rows are left out, first: row 2, column 1 is not a finite number");
     }
 
     #[test]

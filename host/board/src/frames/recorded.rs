@@ -54,15 +54,18 @@ struct Times {
 }
 
 impl Times {
+    /// When what comes now came, but not before the last frame (s).
+    fn now_s(&self) -> f64 {
+        let first_us = self.first_arrived_us.unwrap_or(self.arrived_us);
+        let arrived_s = self.arrived_us.saturating_sub(first_us) as f64 * 1e-6;
+        self.last.map_or(0.0, |(_, last_s)| arrived_s.max(last_s))
+    }
+
     /// The time of a frame (s).
     fn place(&mut self, board_us: u64) -> f64 {
-        let first_us = *self.first_arrived_us.get_or_insert(self.arrived_us);
-        if self.last.is_some_and(|(last_us, _)| board_us < last_us) {
-            self.base = None;
-        }
-        let arrived_s = self.arrived_us.saturating_sub(first_us) as f64 * 1e-6;
-        let after_last_s = self.last.map_or(0.0, |(_, last_s)| arrived_s.max(last_s));
-        let (base_us, base_s) = *self.base.get_or_insert((board_us, after_last_s));
+        self.first_arrived_us.get_or_insert(self.arrived_us);
+        let now_s = self.now_s();
+        let (base_us, base_s) = *self.base.get_or_insert((board_us, now_s));
         let time_s = base_s + board_us.saturating_sub(base_us) as f64 * 1e-6;
         self.last = Some((board_us, time_s));
         time_s
@@ -82,6 +85,10 @@ pub struct RecordingLoss {
     pub missing_us: u64,
     /// Frames of a board with another number of electrodes than the first one, which are left out.
     pub other_frames: u64,
+    /// How often the board started anew.
+    pub restarts: u64,
+    /// When it did so first, since the first frame (us).
+    pub restarted_us: u64,
 }
 
 impl RecordingLoss {
@@ -108,6 +115,12 @@ impl fmt::Display for RecordingLoss {
             self.file.is_any().then(|| self.file.to_string()),
             count(self.corrupt, "message is corrupt", "messages are corrupt"),
             count(self.other_frames, "frame is of another board", "frames are of another board"),
+            count(self.restarts, "restart of the board", "restarts of the board, the first").map(|restarts| {
+                format!(
+                    "{restarts} at {:.3} s, from where times go on by when frames came",
+                    self.restarted_us as f64 * 1e-6
+                )
+            }),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
         if parts.is_empty() { write!(f, "nothing is missing") } else { write!(f, "{}", parts.join("; ")) }
@@ -260,11 +273,23 @@ impl Recorded {
                 }
                 Ok(BoardMessage::Fault(Fault::BrokenWires { electrodes })) => self.broken_wires |= electrodes,
                 Ok(BoardMessage::Clock(said)) => self.clock.said(said, Duration::from_micros(self.times.arrived_us)),
-                Ok(BoardMessage::Hello(Hello { answers: 0, .. })) => self.clock.restart(),
+                Ok(BoardMessage::Hello(Hello { answers: 0, .. })) => self.restarted(),
                 _ => {}
             }
         }
         self.chunk = chunk;
+    }
+
+    /// The board has started anew, and counts from zero.
+    fn restarted(&mut self) {
+        self.clock.restart();
+        self.sequence.restart();
+        // Before its first frame it is no news.
+        if self.times.base.take().is_some() {
+            let at_us = (self.times.now_s() * 1e6).round() as u64;
+            self.lost.restarted_us = if self.lost.restarts == 0 { at_us } else { self.lost.restarted_us };
+            self.lost.restarts += 1;
+        }
     }
 
     /// Takes a frame, with the contacts that came before it, if they are its.
@@ -290,6 +315,10 @@ impl Recorded {
     /// Takes a frame's readings, as measured and as used, and what the board has found in it.
     fn take(&mut self, head: &FrameHead, [measured, used]: [Readings; 2], found: Option<Contacts>) {
         let place = self.sequence.place(head);
+        if self.times.last.is_some_and(|(last_us, _)| place.time_us < last_us) {
+            // Its Hello was lost.
+            self.restarted();
+        }
         if let Some((last_us, _)) = self.times.last.filter(|_| place.dropped > 0) {
             let gap_us = place.time_us.saturating_sub(last_us);
             self.lost.missing_us += gap_us / (place.dropped + 1) * place.dropped;
@@ -329,8 +358,12 @@ mod tests {
     }
 
     fn hello() -> Vec<u8> {
+        encoded(&said())
+    }
+
+    fn encoded(hello: &Hello) -> Vec<u8> {
         let mut wire = [0; MAX_WIRE];
-        let length = encode_board(&BoardMessage::Hello(said()), &mut wire).unwrap();
+        let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire).unwrap();
         wire[..length].to_vec()
     }
 
@@ -376,6 +409,27 @@ mod tests {
     fn times_s(file: &mut FrameFile) -> (Vec<f64>, RecordingLoss) {
         let times = std::iter::from_fn(|| file.next_frame().unwrap()).filter_map(|frame| frame.time_s).collect();
         (times, file.loss().unwrap())
+    }
+
+    #[test]
+    fn a_board_that_starts_anew_is_told_with_the_moment_and_times_go_on() {
+        let start = encoded(&Hello { answers: 0, ..said() });
+        let before = (30_000..30_010).map(|number| frame(number, 7));
+        let after = (0..10).map(|number| frame(number, 7));
+        for chunks in [
+            [hello()].into_iter().chain(before.clone()).chain([start]).chain(after.clone()).collect::<Vec<_>>(),
+            [hello()].into_iter().chain(before).chain(after).collect(),
+        ] {
+            let path = std::env::temp_dir().join(format!("tactomo-{}-frames-restart", std::process::id()));
+            let mut writer = RecordWriter::new(File::create(&path).unwrap(), &Header::default()).unwrap();
+            chunks.iter().enumerate().for_each(|(i, chunk)| writer.write(500_000 * i as u64, chunk).unwrap());
+            let (times, loss) = times_s(&mut FrameFile::open(&path, None).unwrap());
+            std::fs::remove_file(path).unwrap();
+            assert!(times.len() == 20 && times.is_sorted(), "{times:?}");
+            assert!(times[10] >= 4.5, "{times:?}");
+            assert!(!loss.is_damage() && loss.missing_frames == 0 && loss.restarts == 1, "{loss}");
+            assert!(loss.to_string().contains("1 restart of the board at"), "{loss}");
+        }
     }
 
     proptest! {

@@ -5,6 +5,7 @@ use std::time::Instant;
 use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Fault, Hello, VERSION};
 
 use super::{RequestedSettings, Session};
+use crate::check::UnframedBytes;
 use crate::link::Link;
 
 /// Why a board cannot be talked to.
@@ -12,12 +13,12 @@ use crate::link::Link;
 #[non_exhaustive]
 pub enum GreetError {
     /// No Hello in time.
-    #[error("no board said Hello within {seconds} s ({junk_bytes} bytes came that were no message)")]
+    #[error("no board said Hello within {seconds} s. {unframed}")]
     Silent {
         /// How long was waited (s).
         seconds: u64,
-        /// Bytes that came and were no message: many mean another baud rate or another program on the board.
-        junk_bytes: u64,
+        /// What came instead, and what that means.
+        unframed: UnframedBytes,
     },
     /// Answers to commands that were not sent.
     #[error(
@@ -52,11 +53,12 @@ pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError
     let begin = Instant::now();
     let mut receiver = BoardReceiver::default();
     let mut session = Session::new(RequestedSettings::default());
-    let mut buffer = [0; 512];
+    let (mut buffer, mut unframed) = ([0; 512], UnframedBytes::default());
     while Instant::now() < deadline {
         let sent = session.transmit(link, receiver.counters().corrupt);
         let read = sent.and_then(|()| link.read(&mut buffer));
         let count = read.map_err(|error| GreetError::Link(error.to_string()))?;
+        unframed.add(&buffer[..count]);
         let mut input = &buffer[..count];
         while let Some(message) = receiver.receive(&mut input) {
             match message {
@@ -67,8 +69,7 @@ pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError
             }
         }
     }
-    let seconds = begin.elapsed().as_secs();
-    Err(GreetError::Silent { seconds, junk_bytes: receiver.counters().dropped_bytes })
+    Err(GreetError::Silent { seconds: begin.elapsed().as_secs(), unframed })
 }
 
 /// What a fault means, for people.

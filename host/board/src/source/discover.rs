@@ -87,6 +87,7 @@ fn refusal(probe: &Probe) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check::UnframedBytes;
 
     fn probe_of(name: &str, answer: Result<Hello, ProbeError>) -> Probe {
         Probe { port: Port { name: name.to_owned(), usb: true, product: None, serial: None }, answer }
@@ -95,9 +96,11 @@ mod tests {
     #[test]
     fn without_a_board_the_message_says_what_each_port_answered_and_what_to_do() {
         let busy = PortError::Busy { port: "/dev/ttyUSB0".to_owned() };
+        let mut unframed = UnframedBytes::default();
+        unframed.add(b"hello from blinky");
         let probes = [
             probe_of("/dev/ttyUSB0", Err(busy.into())),
-            probe_of("/dev/ttyUSB1", Err(GreetError::Silent { seconds: 3, junk_bytes: 17 }.into())),
+            probe_of("/dev/ttyUSB1", Err(GreetError::Silent { seconds: 3, unframed }.into())),
         ];
         let message = choose(&probes).unwrap_err().to_string();
         for part in ["/dev/ttyUSB0 is busy", "/dev/ttyUSB1: ", "17 bytes", "--simulate", "--port", "cable"] {

@@ -14,7 +14,7 @@ use tactomo::calibrate::pressed::Solved;
 use tactomo::detector::Detector;
 
 use super::reconstruct::reader::Reader;
-use super::reconstruct::units::Unit;
+use super::reconstruct::units::UnitArgs;
 use super::record;
 use super::source::BoardArgs;
 use tactomo_cli::choice::DetectorArgs;
@@ -91,9 +91,8 @@ pub struct Reading {
     /// Frames at the start whose mean is the baseline, and which are no presses [default: as `reconstruct`]
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     rest: Option<u32>,
-    /// Unit of the readings in a table [default: V]
-    #[arg(long, value_name = "V|mV")]
-    unit: Option<Unit>,
+    #[command(flatten)]
+    unit: UnitArgs,
 }
 
 /// What the solver finds in all frames of a recording.

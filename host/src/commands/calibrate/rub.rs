@@ -94,7 +94,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
         lambda: None,
         taught: None,
         rest: args.reading.rest,
-        unit: args.reading.unit,
+        unit: args.reading.unit.given(),
         force: None,
         uncorrected: true,
         keeps_found: false,
@@ -105,6 +105,9 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
     let mut known = args.known.clone();
     if let Some(path) = &args.places {
         known.extend(places(path, is_recording)?);
+    }
+    if !known.is_empty() {
+        reader.ensure_every_row()?;
     }
     let (mut frames, mut rounds) = (Vec::new(), Rounds::default());
     let mut used = vec![false; known.len()];
@@ -117,9 +120,6 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
         });
         let readings = frame.readings().filter(|readings| readings.electrodes() == electrodes);
         let readings = readings.with_context(|| reader.place())?;
-        if readings.volts().iter().any(|volts| !volts.is_finite()) {
-            bail!("{}: a reading is not a finite number", reader.place());
-        }
         let whole = rounds.add(&readings, frame.time_s.unwrap_or_default()).filter(Readings::is_whole);
         frames.extend(whole.map(|readings| Frame { readings, known_m: place }));
     }
@@ -133,9 +133,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
     if left_out > 0 {
         message!("{left_out} frames of some grounds are left out, which make no whole one");
     }
-    if let Some(losses) = reader.losses() {
-        message!("warning: {losses}");
-    }
+    reader.warn();
     let unused = known.iter().zip(&used).find(|(_, used)| !**used).map(|(known, _)| known);
     check_used(file, unused, is_recording)?;
     check_places(&known, &nominal)?;

@@ -17,6 +17,7 @@ use tactomo::sink::place::Place;
 use tactomo::sink::{Delivery, Renewal};
 use tactomo::solve::Solution;
 use tactomo_cli::output::message;
+use tactomo_protocol::Hello;
 
 use crate::commands::reconstruct::reader::{Input, Reader};
 use crate::commands::streams::Streamed;
@@ -131,6 +132,11 @@ impl Recording {
         self.reader.mesh()
     }
 
+    /// Its board.
+    pub fn board(&self) -> Option<&Hello> {
+        self.reader.board()
+    }
+
     /// Its detector, as streams know it.
     pub fn streamed(&self) -> anyhow::Result<Streamed> {
         let known = self.reader.measured().zip(self.reader.mesh());
@@ -149,7 +155,7 @@ impl Recording {
         let of = if self.name.is_empty() { String::new() } else { format!("{}: ", self.name) };
         message!("{of}{}: {} frames in {}", self.reader.name(), self.answers, out.display());
         self.reader.notice().iter().for_each(|notice| message!("{of}{notice}"));
-        self.reader.losses().iter().for_each(|losses| message!("warning: {losses}"));
+        self.reader.warn();
     }
 }
 

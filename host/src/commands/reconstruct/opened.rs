@@ -14,6 +14,7 @@ use tactomo::solve::{
 use tactomo_cli::output::message;
 
 use super::reader::{Input, Touch};
+use super::units::Unit;
 
 /// A file and what solves it.
 pub struct Opened {
@@ -77,7 +78,7 @@ fn solved(input: &Input, method: Method, learned: Option<Learned>) -> anyhow::Re
             file.set_ground(measured.ground_v);
             measured
         }
-        None => chosen.clone(),
+        None => input.unit.unwrap_or(Unit::Volt).read(chosen.clone()),
     };
     let correction = detector.correction.filter(|_| !input.uncorrected);
     let detector = Detector { force: input.force.clone().or(detector.force), correction, ..detector };

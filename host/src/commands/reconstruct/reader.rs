@@ -5,20 +5,22 @@ use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::baseline::{BaselineState, BaselineTracker};
-use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
+use tactomo::board::frames::{FileFrame, FrameFile, LeftOut, RecordingLoss};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
 use tactomo::learned::Learned;
 use tactomo::readings::Readings;
 use tactomo::run::NewestReadings;
-use tactomo::solve::{Kernel, Lambda, Method, Presses, Solution, Solver};
+use tactomo::solve::{Kernel, Lambda, Method, Presses, Solution, Solver, below_rest_v};
 
 use tactomo_protocol::Hello;
 
 use super::by_board::ByBoard;
+use super::checks::{Doubts, TableChecks};
 use super::opened::Opened;
 use super::units::{self, Unit};
 use tactomo_cli::choice::{DetectorArgs, Model};
+use tactomo_cli::output::message;
 
 /// What is read, and what solves it.
 pub struct Input<'a> {
@@ -68,12 +70,11 @@ impl Taught<'_> {
 pub struct Reader {
     path: PathBuf,
     frames: Frames,
-    baseline: BaselineTracker,
-    /// Frames that were read.
+    rest: Rest,
+    /// Frames that were read; of a table rows, those included that are left out.
     count: usize,
-    /// Frames still to come that are the baseline and nothing else, because the user said so.
-    given: u32,
     touch: Touch,
+    doubts: Doubts,
     /// Readings of the newest frame as they are used, before the baseline was taken off (V).
     used_v: Vec<f64>,
     /// The detector as it was chosen, of a solver for a detector.
@@ -87,8 +88,30 @@ pub struct Reader {
 enum Frames {
     /// Of a recording.
     Recording(FrameFile),
-    /// Of a table, all of which is read before the first is solved: their unit is checked on the largest of all.
-    Table(std::vec::IntoIter<FileFrame>),
+    /// Of a table, all of which is read before the first is solved: it is checked as a whole.
+    Table { frames: std::vec::IntoIter<FileFrame>, left_out: Option<LeftOut>, board: Option<Box<Hello>> },
+}
+
+/// What readings are at rest.
+#[derive(Clone)]
+pub struct Rest {
+    baseline: BaselineTracker,
+    /// Frames still to come that are the baseline and nothing else, because the user said so.
+    given: u32,
+}
+
+impl Rest {
+    /// A frame as it is, and less the baseline; `None` if it is one of the baseline.
+    pub fn take(&mut self, frame: &FileFrame) -> Option<FileFrame> {
+        frame.note_rest(&mut self.baseline);
+        if self.given > 0 {
+            self.given -= 1;
+            return None;
+        }
+        let mut less = frame.clone();
+        self.baseline.subtract(&frame.volts, &mut less.volts);
+        Some(less)
+    }
 }
 
 /// What solves frames.
@@ -123,20 +146,40 @@ impl Reader {
         let Opened { file, touch, jacobian, chosen } = Opened::of(input, solver, taught)?;
         // It is taken as live takes it, while frames are solved.
         let conversions = file.board().map_or(1, |board| board.settings.conversions());
-        let baseline = match (&jacobian, input.rest) {
+        let channels = file.channels();
+        let detector = jacobian.as_ref().map(|jacobian| &jacobian.detector);
+        let frames = Frames::of(file, input, detector)?;
+        let given = input.rest.map(|rest| frames.among_first(rest));
+        if let (Some(rest @ 1..), Some(0)) = (input.rest, given) {
+            bail!(
+                "{}: the first {rest} rows are to be the baseline, and none of them is of numbers",
+                input.file.display()
+            );
+        }
+        let baseline = match (&jacobian, given) {
             (Some(jacobian), None) => BaselineTracker::new(Arc::clone(jacobian), conversions),
             (Some(jacobian), Some(frames)) => BaselineTracker::given(Arc::clone(jacobian), conversions, frames),
-            (None, frames) => BaselineTracker::over(frames.unwrap_or(0), file.channels()),
+            (None, frames) => BaselineTracker::over(frames.unwrap_or(0), channels),
         };
-        let frames = Frames::of(file, input, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
-        let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));
+        let rest = Rest { baseline, given: given.unwrap_or(0) };
+        let checks = TableChecks { unit: input.unit.unwrap_or(Unit::Volt), rest: input.rest };
+        let doubts = match (&frames, detector) {
+            (Frames::Table { frames, board: None, .. }, Some(detector)) => {
+                checks.doubts(frames.as_slice(), rest.clone(), detector)
+            }
+            _ => checks.none(),
+        };
+        let left_out = frames.left_out().map(ToString::to_string);
+        for what in left_out.into_iter().chain(doubts.of_table()) {
+            message!("warning: {}: {what}", input.file.display());
+        }
         Ok(Self {
-            path,
+            path: input.file.to_owned(),
             frames,
-            baseline,
+            rest,
             count: 0,
-            given,
             touch,
+            doubts,
             used_v: Vec::new(),
             detector: chosen,
             by_board: ByBoard::default(),
@@ -161,7 +204,7 @@ impl Reader {
     pub fn board(&self) -> Option<&Hello> {
         match &self.frames {
             Frames::Recording(file) => file.board(),
-            Frames::Table(_) => None,
+            Frames::Table { board, .. } => board.as_deref(),
         }
     }
 
@@ -180,37 +223,44 @@ impl Reader {
 
     /// The next frame after those of the baseline, with readings (V) less the baseline.
     pub fn next_frame(&mut self) -> anyhow::Result<Option<FileFrame>> {
-        while let Some(mut frame) = self.frames.next()? {
+        while let Some(frame) = self.frames.next()? {
             self.count += 1;
+            if !self.is_recording() {
+                self.count += frame.lost_before as usize;
+            }
             self.is_by_board = frame.found_alone().is_some();
-            if self.is_by_board {
-                self.used_v.clone_from(&frame.volts);
-                return Ok(Some(frame));
+            let less = if self.is_by_board { Some(frame.clone()) } else { self.rest.take(&frame) };
+            self.used_v = frame.volts;
+            if less.is_some() {
+                return Ok(less);
             }
-            if self.given == 0 {
-                frame.note_rest(&mut self.baseline);
-                self.used_v.clone_from(&frame.volts);
-                self.baseline.subtract(&self.used_v, &mut frame.volts);
-                return Ok(Some(frame));
-            }
-            if frame.volts.iter().any(|volts| !volts.is_finite()) {
-                bail!("{}: the baseline needs finite readings, but some of these are not", self.place());
-            }
-            frame.note_rest(&mut self.baseline);
-            self.given -= 1;
         }
         Ok(None)
     }
 
-    /// What is missing in the file, in words; `None` if nothing is.
-    pub fn losses(&self) -> Option<String> {
-        let loss = self.frames.loss().filter(RecordingLoss::is_any)?;
-        Some(format!("{}: {loss}", self.path.display()))
+    /// Says what was missing in a recording, and what is doubtful in the frames that were solved. What is wrong with a table as a whole is said when it
+    /// is opened.
+    pub fn warn(&self) {
+        let loss = self.frames.loss().filter(RecordingLoss::is_any).map(|loss| loss.to_string());
+        for what in [loss, self.doubts.of_frames()].into_iter().flatten() {
+            message!("warning: {}: {what}", self.path.display());
+        }
+    }
+
+    /// Checks that no row of a table is left out, for what counts its rows.
+    pub fn ensure_every_row(&self) -> anyhow::Result<()> {
+        match self.frames.left_out() {
+            Some(left_out) => bail!(
+                "{}: {left_out}. Presses are told by the number of their row, so each has to be right: mend it, or leave it out with its press",
+                self.path.display()
+            ),
+            None => Ok(()),
+        }
     }
 
     /// What a person should know of the baseline, in words. That a table begins with a press is no news: most are of presses alone.
     pub fn notice(&self) -> Option<String> {
-        let state = self.baseline.state();
+        let state = self.rest.baseline.state();
         let is_table_of_presses = !self.is_recording() && matches!(state, BaselineState::Pressed(_));
         state.notice().filter(|_| !is_table_of_presses)
     }
@@ -230,7 +280,7 @@ impl Reader {
 
     /// Whether the baseline is being taken.
     pub fn is_taking_baseline(&self) -> bool {
-        if self.is_by_board { self.by_board.is_taking_rest } else { self.baseline.state().is_taking() }
+        if self.is_by_board { self.by_board.is_taking_rest } else { self.rest.baseline.state().is_taking() }
     }
 
     /// Radius that contacts have where it is not known (m).
@@ -243,6 +293,20 @@ impl Reader {
 
     /// What a frame's readings (less the baseline) say.
     pub fn solve(&mut self, frame: &FileFrame) -> anyhow::Result<Solution> {
+        let mut solution = self.solved(frame)?;
+        if let Some(detector) = self.measured().filter(|_| !self.is_by_board)
+            && let Some(touch) = self.touch(frame)
+        {
+            let below_v = below_rest_v(&touch, detector);
+            self.doubts.note(below_v, &self.used_v);
+        }
+        if self.doubts.is_of_all() {
+            solution.doubt();
+        }
+        Ok(solution)
+    }
+
+    fn solved(&mut self, frame: &FileFrame) -> anyhow::Result<Solution> {
         if let (Some(found), Touch::Solver { detector, .. }) = (frame.found_alone(), &self.touch) {
             return Ok(self.by_board.solution(found, detector));
         }
@@ -309,36 +373,55 @@ impl Frames {
     /// Of a file, in volts.
     fn of(mut file: FrameFile, input: &Input, detector: Option<&Detector>) -> anyhow::Result<Self> {
         let path = input.file.display();
-        if file.board().is_some() {
-            ensure!(input.unit.is_none(), "leave out --unit: {path} is a recording, which knows its unit");
+        let board = file.board().cloned().map(Box::new);
+        ensure!(
+            board.is_none() || input.unit.is_none(),
+            "leave out --unit and --adc: {path} says how its board measures"
+        );
+        if matches!(file, FrameFile::Recording(_)) {
             return Ok(Self::Recording(file));
         }
-        let unit = input.unit.unwrap_or(Unit::Volt);
         let mut frames = Vec::new();
-        while let Some(mut frame) = file.next_frame()? {
-            let all = frame.volts.iter_mut().chain(&mut frame.measured_v);
-            all.for_each(|value| *value *= unit.volts());
+        while let Some(frame) = file.next_frame()? {
             frames.push(frame);
         }
-        if let Some(detector) = detector {
-            let volts = frames.iter().flat_map(|frame| frame.volts.iter().copied());
-            units::check(volts, unit, detector).map_err(|what| anyhow!("{path}: {what}"))?;
+        let unit = input.unit.unwrap_or(Unit::Volt);
+        units::make_volts(&mut frames, unit, detector).map_err(|what| anyhow!("{path}: {what}"))?;
+        Ok(Self::Table { frames: frames.into_iter(), left_out: file.left_out().cloned(), board })
+    }
+
+    /// How many frames are among so many at the start, those included that are left out of a table.
+    fn among_first(&self, rows: u32) -> u32 {
+        let Self::Table { frames, .. } = self else { return rows };
+        let ends = frames.as_slice().iter().scan(0, |row, frame| {
+            *row += 1 + frame.lost_before;
+            Some(*row)
+        });
+        let among = ends.take_while(|end| *end <= u64::from(rows)).count() as u32;
+        // A table that is all baseline is told so.
+        if among as usize == frames.len() { rows } else { among }
+    }
+
+    /// Rows of a table that are left out.
+    fn left_out(&self) -> Option<&LeftOut> {
+        match self {
+            Self::Recording(_) => None,
+            Self::Table { left_out, .. } => left_out.as_ref(),
         }
-        Ok(Self::Table(frames.into_iter()))
     }
 
     /// What of the file could not be read so far.
     fn loss(&self) -> Option<RecordingLoss> {
         match self {
             Self::Recording(file) => file.loss(),
-            Self::Table(_) => None,
+            Self::Table { .. } => None,
         }
     }
 
     fn next(&mut self) -> anyhow::Result<Option<FileFrame>> {
         match self {
             Self::Recording(file) => Ok(file.next_frame()?),
-            Self::Table(frames) => Ok(frames.next()),
+            Self::Table { frames, .. } => Ok(frames.next()),
         }
     }
 }

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Cursor, Write};
 
 use anyhow::bail;
+use tactomo::board::frames::{BOARD, hello_bytes};
 use tactomo::detector::short;
 use tactomo::forward::ImageMesh;
 use tactomo::schema::{
@@ -14,6 +15,7 @@ use tactomo::table::{CsvWriter, NpzWriter, Values};
 
 use super::Args;
 use tactomo_cli::output::{NewFile, unless_closed};
+use tactomo_protocol::Hello;
 
 /// Where frames go.
 pub struct Writer {
@@ -153,12 +155,13 @@ impl Writer {
         }
     }
 
-    /// Writes what is left.
-    pub fn finish(mut self, mesh: Option<&ImageMesh>) -> anyhow::Result<()> {
+    /// Writes what is left: the places of images, and the board that readings are of.
+    pub fn finish(mut self, mesh: Option<&ImageMesh>, board: Option<&Hello>) -> anyhow::Result<()> {
+        let board = board.map(hello_bytes).transpose()?;
         let written = match (&mut self.form, &self.file) {
             (Form::People(out) | Form::Json(out), _) => out.flush(),
             (Form::Csv(table), _) => table.flush(),
-            (Form::Npz(arrays), Some(file)) => arrays.write(file.create()?, mesh),
+            (Form::Npz(arrays), Some(file)) => arrays.write(file.create()?, mesh, board.as_deref()),
             (Form::Npz(_), None) => Ok(()),
         };
         unless_closed(written).map_err(|error| self.failed(error))?;
@@ -243,7 +246,7 @@ impl Arrays {
         }
     }
 
-    fn write(&self, mut out: BufWriter<File>, mesh: Option<&ImageMesh>) -> io::Result<()> {
+    fn write(&self, mut out: BufWriter<File>, mesh: Option<&ImageMesh>, board: Option<&[i64]>) -> io::Result<()> {
         // In memory, as the arrays are: an archive that cannot be ended says so on stderr by itself.
         let mut bytes = Vec::new();
         let mut writer = NpzWriter::new(Cursor::new(&mut bytes));
@@ -277,6 +280,9 @@ impl Arrays {
             let shape = [self.readings[0].len() / (n * n), n, n];
             for (name, readings) in ["readings_v", "used_v", "touch_v"].into_iter().zip(&self.readings) {
                 writer.add(name, &shape, readings)?;
+            }
+            if let Some(board) = board {
+                writer.add_values(BOARD, &[board.len()], Values::Integers(board))?;
             }
         }
         writer.finish()?;

@@ -38,7 +38,7 @@ enum Command {
         json: bool,
     },
     /// Reads recordings from end to end and says what is damaged or missing, in frames and seconds; exit code 1 if a file is damaged or cannot be read.
-    /// What was lost on the line damages no file
+    /// What was lost on the line damages no file, nor does a board that started anew, which is told with the time
     Check {
         /// The recordings
         #[arg(value_name = "FILE", required = true)]

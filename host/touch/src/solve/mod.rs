@@ -45,6 +45,7 @@ pub use self::fit::lambda::{Lambda, UnknownLambda};
 pub use self::fit::policy::all as thresholds;
 pub use self::health::electrodes::faulty_electrodes;
 pub(crate) use self::health::electrodes::{Pair as PairOfLoads, loads};
+pub use self::health::table::{TableDoubt, table_doubt};
 pub use self::health::watch::{ElectrodeWatch, FaultyElectrodes, Look};
 pub use self::methods::auto::Auto;
 pub use self::methods::comparisons::{Bsbl, Nonnegative, Tv};
@@ -57,8 +58,11 @@ pub use self::methods::network::NetworkSolver;
 pub use self::pipeline::fault_tolerant::FaultTolerant;
 pub use self::pipeline::method::{Family, Method, UnknownSolver};
 pub use self::pipeline::parameter::{Parameter, ParameterKind};
+pub use self::pipeline::unexplained::below_rest_v;
 pub use self::pipeline::without::without;
 pub use self::problem::{LearnedElsewhere, Problem};
 pub use self::solver::{Followed, Hypothesis, Parts, Search, Solver, Tracker};
-pub use crate::learned::kernel::{Description, Kernel, Press, Presses, PressesError, Strength, TeachError};
+pub use crate::learned::kernel::{
+    Description, Kernel, Press, Presses, PressesError, Strength, TeachError, check_newtons,
+};
 pub use crate::learned::network::{Network, NetworkError};

@@ -12,7 +12,6 @@ use super::report::ReportedPress;
 use crate::commands::calibrate::solved;
 use crate::commands::reconstruct::reader::{Input, Reader};
 use tactomo_cli::choice::Model;
-use tactomo_cli::output::message;
 
 /// What to do where several contacts are found.
 const ONE_TIP: &str =
@@ -36,7 +35,7 @@ pub fn gather(args: &PressArgs, known: &Known) -> anyhow::Result<Gathered> {
         lambda: None,
         taught: None,
         rest: args.reading.rest,
-        unit: args.reading.unit,
+        unit: args.reading.unit.given(),
         force: Some(ForceLaw::siemens()),
         uncorrected: false,
         keeps_found: false,
@@ -58,9 +57,7 @@ pub fn gather(args: &PressArgs, known: &Known) -> anyhow::Result<Gathered> {
 /// Solves all frames of a recording.
 fn frames(reader: &mut Reader) -> anyhow::Result<Vec<Solved>> {
     let frames = solved(reader)?;
-    if let Some(losses) = reader.losses() {
-        message!("warning: {losses}");
-    }
+    reader.warn();
     ensure!(
         frames.iter().any(|frame| !frame.contacts.is_empty()),
         "{}: no press in any of its {} frames: press firmer, each press for a second{}",
@@ -109,6 +106,7 @@ fn of_sensor(reader: &mut Reader, forces: &[[f64; 2]]) -> anyhow::Result<Vec<Rep
 }
 
 fn of_rows(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec<ReportedPress>> {
+    reader.ensure_every_row()?;
     let (mut presses, mut empty) = (Vec::new(), Vec::new());
     let mut rows = 0;
     while let Some(frame) = reader.next_frame()? {
@@ -145,5 +143,6 @@ fn of_rows(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec<Rep
             forces[row - 1].force_n
         );
     }
+    reader.warn();
     Ok(presses)
 }

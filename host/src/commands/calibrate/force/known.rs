@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{anyhow, ensure};
 use tactomo::calibrate::force::{Direction, ForcePress};
 use tactomo::hertz::FORCE_N;
+use tactomo::solve::check_newtons;
 use tactomo::table::{Array, Table};
 
 /// So many columns are named in errors.
@@ -38,6 +39,7 @@ impl Known {
     /// Forces that were typed, or those of a file.
     pub fn of(newtons: &[f64], file: Option<&Path>) -> anyhow::Result<Self> {
         let Some(path) = file else {
+            check_newtons("--newtons", newtons).map_err(anyhow::Error::msg)?;
             let known = |force_n: &f64| KnownForce { force_n: *force_n, direction: None };
             return Ok(Self::Presses(newtons.iter().map(known).collect()));
         };
@@ -122,7 +124,9 @@ impl Columns {
             let direction = direction(row).map_err(|what| anyhow!("row {}: {what}", row + 1))?;
             Ok(KnownForce { force_n: *force_n, direction })
         };
-        forces_n.iter().enumerate().map(known).collect()
+        let known = forces_n.iter().enumerate().map(known).collect::<anyhow::Result<_>>()?;
+        check_newtons("force_n", forces_n).map_err(anyhow::Error::msg)?;
+        Ok(known)
     }
 
     fn of(table: Table) -> Self {
@@ -152,6 +156,7 @@ fn sensor(times_s: &[f64], forces_n: &[f64]) -> anyhow::Result<Known> {
     if let Some(row) = times_s.windows(2).position(|pair| pair[1] <= pair[0]) {
         return Err(anyhow!("row {}: time_s has to rise from row to row", row + 2));
     }
+    check_newtons("force_n", forces_n).map_err(anyhow::Error::msg)?;
     Ok(Known::Sensor(times_s.iter().zip(forces_n).map(|(time_s, force_n)| [*time_s, *force_n]).collect()))
 }
 
@@ -217,6 +222,8 @@ mod tests {
             ("time_s,force_n\n1,1\n1,2\n", "row 2: time_s has to rise"),
             ("time_s,force_n\n1,nan\n2,2\n", "row 1: the force is NaN N"),
             ("time_s,force_n\nnan,1\n2,2\n", "have to be finite"),
+            ("time_s,force_n\n1,50\n2,300\n", "force_n goes up to 300 N: are these grams?"),
+            ("force_n\n50\n500\n", "force_n goes up to 500 N: are these grams?"),
         ] {
             assert!(read(text).is_err_and(|what| what.contains(told)), "{text}");
         }

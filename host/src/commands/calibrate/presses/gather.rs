@@ -13,7 +13,6 @@ use crate::commands::calibrate::known::{KnownPlace, NEAR_S, check_used};
 use crate::commands::calibrate::solved;
 use crate::commands::reconstruct::reader::{Input, Reader};
 use tactomo_cli::choice::Model;
-use tactomo_cli::output::message;
 
 /// Known places, and whether they are in the order of the presses.
 pub struct Known {
@@ -73,7 +72,7 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
         lambda: None,
         taught: None,
         rest: args.reading.rest,
-        unit: args.reading.unit,
+        unit: args.reading.unit.given(),
         // Conductances with their constriction, as laws of force have them.
         force: Some(ForceLaw::siemens()),
         uncorrected: true,
@@ -86,9 +85,7 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
         (true, false) => of_times(&mut reader, &known)?,
         (true, true) => of_plateaus(&mut reader, &known)?,
     };
-    if let Some(losses) = reader.losses() {
-        message!("warning: {losses}");
-    }
+    reader.warn();
     let (mut presses, mut skipped) = (Vec::new(), Vec::new());
     for ((place, found), known) in found.into_iter().zip(&known.places) {
         match found {
@@ -113,6 +110,7 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
 
 /// Presses of a table, in the order of the places.
 fn of_rows(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, Found)>> {
+    reader.ensure_every_row()?;
     let mut found: Vec<Option<Found>> = vec![None; known.places.len()];
     let mut rows = 0;
     while let Some(frame) = reader.next_frame()? {

@@ -22,7 +22,7 @@ use self::features::{Described, Features};
 use self::left_over::LeftOver;
 use self::novelty::Novelty;
 use self::points::Points;
-pub use self::presses::{Presses, PressesError, Strength};
+pub use self::presses::{Presses, PressesError, Strength, check_newtons};
 use self::regression::{Lesson, Regression};
 use crate::solve::answer::{Flags, FoundContact, Solution};
 use tactomo_table::{Array, Table};

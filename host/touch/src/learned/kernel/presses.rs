@@ -10,10 +10,10 @@ use tactomo_table::{Table, TableError};
 const FEWEST: usize = 10;
 /// Rows whose places are this near (m) are of one press, or of presses at one place: robots repeat to 0.02 to 0.1 mm.
 const SAME_M: f64 = 1e-4;
-/// Farthest that a place is from the middle of all (m), hardest force (N) and deepest depth (m) that are believed: sensors are smaller than a person, and no
-/// finger or indenter presses a foam with the weight of a man.
+/// Farthest that a place is from the middle of all (m), hardest force of a press (N) and deepest depth (m) that are believed: sensors are smaller than a
+/// person, and who presses with all the strength of a finger reaches about 50 N.
 const FARTHEST_M: f64 = 1.5;
-const HARDEST_N: f64 = 500.0;
+const HARDEST_N: f64 = 100.0;
 const DEEPEST_M: f64 = 0.1;
 
 /// Readings, places and strengths of presses, one contact each.
@@ -79,6 +79,18 @@ pub enum PressesError {
         /// What is wrong and what is needed.
         what: String,
     },
+}
+
+/// Checks that forces of presses can be newtons; `name` is what they are called where they are given.
+///
+/// # Errors
+/// What they may be, and what to do.
+pub fn check_newtons(name: &str, forces_n: &[f64]) -> Result<(), String> {
+    let largest_n = forces_n.iter().copied().map(f64::abs).fold(0.0, f64::max);
+    if largest_n <= HARDEST_N {
+        return Ok(());
+    }
+    Err(format!("{name} goes up to {largest_n:.4} N: are these grams? 1 N is 102 g: divide them by 102"))
 }
 
 impl Presses {
@@ -183,9 +195,7 @@ impl Presses {
         }
         let largest = largest(&mut self.strengths.iter().copied());
         match self.strength {
-            Some(Strength::Force) if largest > HARDEST_N => {
-                Err(format!("force_n goes up to {largest:.4} N: are these grams? 1 N is 102 g: divide them by 102"))
-            }
+            Some(Strength::Force) => check_newtons("force_n", &self.strengths),
             Some(Strength::Depth) if largest > DEEPEST_M => {
                 Err(format!("depth_m goes up to {largest:.4} m: are these millimetres? Divide them by 1000"))
             }

@@ -52,6 +52,12 @@ impl Solution {
     pub fn is_contacts(&self) -> bool {
         self.shape.is_none() && self.image_s_per_m2.is_none()
     }
+
+    /// Flags it as a misfit, which is sure of no number.
+    pub fn doubt(&mut self) {
+        self.flags.misfit = true;
+        (self.certainty, self.alternative) = (None, None);
+    }
 }
 
 /// Another number of contacts than was found, which may be the right one.

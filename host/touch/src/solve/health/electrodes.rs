@@ -24,7 +24,7 @@ const UNGROUNDED: f64 = 0.97;
 /// parts their converters. Of 16 rows, noise alone takes one this far in one frame of 3000.
 const SAME: f64 = 4.25;
 /// An electrode is wrong if the mean square of its numbers, in what noise makes of them, is above this ...
-const WRONG: f64 = 8.0;
+pub(super) const WRONG: f64 = 8.0;
 /// ... and without it that of the others is at most this share of it.
 const ALONE: f64 = 0.2;
 /// Error of the numbers besides noise: of a converter that is not quite even.
@@ -157,8 +157,8 @@ pub(crate) struct Pair {
     pub weight: f64,
 }
 
-/// Mean square of what the logarithms are off, in what noise makes of them.
-fn disagreement(readings: &Readings, electrodes: &[usize], drive_v: f64, noise_v: f64) -> f64 {
+/// What the readings of all pairs of some electrodes say, row by row.
+pub(super) fn pairs(readings: &Readings, electrodes: &[usize], drive_v: f64, noise_v: f64) -> Vec<Pair> {
     let n = electrodes.len();
     let mut pairs = vec![Pair::default(); n * n];
     for i in 0..n {
@@ -168,6 +168,13 @@ fn disagreement(readings: &Readings, electrodes: &[usize], drive_v: f64, noise_v
             pairs[j * n + i] = Pair { log: -pair.log, ..pair };
         }
     }
+    pairs
+}
+
+/// Mean square of what the logarithms are off, in what noise makes of them.
+pub(super) fn disagreement(readings: &Readings, electrodes: &[usize], drive_v: f64, noise_v: f64) -> f64 {
+    let n = electrodes.len();
+    let pairs = pairs(readings, electrodes, drive_v, noise_v);
     let loads = loads(&pairs, n);
     let (mut sum, mut counted) = (0.0, 0_usize);
     for i in 0..n {

@@ -1,4 +1,5 @@
-//! Which electrodes cannot be right.
+//! Which electrodes cannot be right, and which tables.
 
 pub(crate) mod electrodes;
+pub(crate) mod table;
 pub(crate) mod watch;

@@ -12,7 +12,7 @@
 pub(crate) mod fault_tolerant;
 pub(crate) mod method;
 pub(crate) mod parameter;
-mod unexplained;
+pub(crate) mod unexplained;
 pub(crate) mod without;
 
 use std::borrow::Cow;

@@ -25,21 +25,34 @@ impl Unexplained {
 
     /// The answer to these readings, flagged if it leaves much of them.
     pub fn flagged(&self, readings: &Readings, mut solution: Solution) -> Solution {
-        let (size_v, below_v) = (readings.rms_v(), readings.rms_below_rest_v());
+        let size_v = readings.rms_v();
         let says_nothing = solution.contacts.is_empty() && solution.is_contacts();
         let left_v = match solution.residual {
             Some(residual) => residual * self.noise_v,
             None if says_nothing => size_v,
             None => 0.0,
         };
-        let is_large =
-            |volts: f64, share: f64| volts > policy::misfit_deviations() * self.noise_v && volts > share * size_v;
-        if is_large(left_v, policy::left_share()) || is_large(below_v, policy::outside_share()) {
-            solution.flags.misfit = true;
-            (solution.certainty, solution.alternative) = (None, None);
+        if self.is_large(left_v, policy::left_share() * size_v) || self.are_below_rest(readings) {
+            solution.doubt();
         }
         solution
     }
+
+    /// Whether much of the readings is below those at rest.
+    fn are_below_rest(&self, readings: &Readings) -> bool {
+        self.is_large(readings.rms_below_rest_v(), policy::outside_share() * readings.rms_v())
+    }
+
+    fn is_large(&self, volts: f64, least_v: f64) -> bool {
+        volts > policy::misfit_deviations() * self.noise_v && volts > least_v
+    }
+}
+
+/// How far the lowest of readings (V, less the baseline) is below those at rest (V), if so much of them is that they are not of this detector at all, or
+/// the baseline is not.
+pub fn below_rest_v(readings: &Readings, detector: &Detector) -> Option<f64> {
+    let lowest_v = readings.touches_v().iter().copied().fold(0.0, f64::min);
+    Unexplained::of(detector).are_below_rest(readings).then_some(-lowest_v)
 }
 
 #[cfg(test)]
