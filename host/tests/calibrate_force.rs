@@ -254,7 +254,9 @@ fn a_file_is_never_replaced_and_bad_presses_write_none() {
     let other = folder.with("other.toml", seven);
     let message = refused(&folder, &[&good, "--detector", &other, "--newtons", &list(&TEN_N)]);
     assert!(
-        message.contains("has 256 readings a frame (these are of 16 electrodes), but the detector strip-13x60 with its 14 electrodes"),
+        message.contains(
+            "has 256 readings a frame (these are of 16 electrodes), but the detector strip-13x60 with its 14 electrodes"
+        ),
         "{message}"
     );
     for wrong in [

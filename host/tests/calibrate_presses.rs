@@ -274,7 +274,10 @@ fn bad_presses_say_what_to_do_and_write_nothing() {
     let seven = Detector::preset("strip-13x60").unwrap().to_toml().replace("grid = [2, 8]", "grid = [2, 7]");
     let other = folder.with("other.toml", seven);
     let message = refused(&folder, &[&good, "--detector", &other, "--places", &places]);
-    assert!(message.contains("has 256 readings a frame (these are of 16 electrodes), but the detector strip-13x60"), "{message}");
+    assert!(
+        message.contains("has 256 readings a frame (these are of 16 electrodes), but the detector strip-13x60"),
+        "{message}"
+    );
     let precious = folder.with("precious.toml", "precious");
     let output = TACTOMO.run(&["calibrate", "presses", &good, "--places", &places, "--out", &precious]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("exists already, and no file is replaced"));
