@@ -72,7 +72,8 @@ pub struct Flags {
     pub misfit: bool,
     /// The method stopped before its end, to keep a limit of time or steps.
     pub unfinished: bool,
-    /// The readings are those of a detector that differs from the one described, within its tolerances: a calibration would tell more.
+    /// A place is known no better than to a fifteenth of the distance of electrodes, since the detector differs from its description within its
+    /// tolerances: after a calibration it would be known twice as well.
     pub calibrate: bool,
     /// Electrodes that were left out.
     pub excluded: Vec<usize>,

@@ -153,10 +153,16 @@ struct Certainty {
 }
 
 impl Certainty {
-    /// Of so many contacts, by the logarithms of the evidence for each count; `None` if nothing can be said.
-    fn of(count: usize, by_count: &[f64]) -> Option<Self> {
-        let shares = || by_count.iter().map(|other| (other - by_count[count]).exp());
-        let share = Some(1.0 / shares().sum::<f64>()).filter(|share| share.is_finite())?;
+    /// Of so many contacts, by the logarithms of the evidence for each count, on a detector that is known exactly or not; `None` if nothing can be
+    /// said.
+    fn of(count: usize, by_count: &[f64], is_exact: bool) -> Option<Self> {
+        let [more_nat, untried] = match is_exact {
+            true => [1.0, 0.0],
+            false => [policy::more_contacts_nat(), policy::untried_share()],
+        };
+        let nat = |other: usize| if other > count { more_nat } else { 1.0 };
+        let shares = || by_count.iter().enumerate().map(|(other, ln)| (nat(other) * (ln - by_count[count])).exp());
+        let share = Some((1.0 - untried) / shares().sum::<f64>()).filter(|share| share.is_finite())?;
         let others = shares().enumerate().filter(|(other, _)| *other != count);
         let other = others.max_by(|(_, a), (_, b)| a.total_cmp(b));
         let other = other.map(|(contacts, of)| Alternative { contacts, certainty: of * share });
@@ -200,7 +206,8 @@ impl ContactHypothesis {
 
     /// A fit, with the logarithms of the evidence for each count.
     fn new(fit: DiscFit, by_count: &[f64], target: &Target) -> Self {
-        Self { certainty: Certainty::of(fit.contacts.len(), by_count), ..Self::of(fit, target) }
+        let certainty = Certainty::of(fit.contacts.len(), by_count, target.error().is_none());
+        Self { certainty, ..Self::of(fit, target) }
     }
 }
 
@@ -399,8 +406,8 @@ impl ContactFinder {
         }
     }
 
-    /// What a calibration would bring, if the detector as described leaves more of the readings than noise and the model's own error do, and
-    /// that is what places are not known better for.
+    /// What a calibration would bring, if a place is not known well, the detector as described leaves more of the readings than noise and the model's
+    /// own error do, and that is what the place is not known better for.
     fn calibrated(&self, fit: &DiscFit, target: &Target) -> Option<Calibrated> {
         let exact = target.as_exact(&self.errors)?;
         let freedom = self.freedom(fit, &exact);
@@ -412,7 +419,8 @@ impl ContactFinder {
         };
         let [now_m, exact_m] = [&fit.covariance()?, &known].map(largest_m);
         let calibrated_m = exact_m.hypot(policy::calibrated_share() * self.spacing_m);
-        (is_off && now_m > policy::calibration_worth() * calibrated_m).then_some(Calibrated { now_m, calibrated_m })
+        let worth_m = (policy::calibration_worth() * calibrated_m).max(policy::known_share() * self.spacing_m);
+        (is_off && now_m > worth_m).then_some(Calibrated { now_m, calibrated_m })
     }
 
     /// What the readings say of a contact's conductance and radius.

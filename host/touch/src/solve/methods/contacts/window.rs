@@ -59,7 +59,7 @@ impl ContactFinder {
         let still = Still::about(last, best.staying()?, best.levels());
         let target = self.informed(target, &contacts, &window.about).unwrap_or_else(|| target.clone());
         let fit = self.disc_fitter().fit_still(contacts, Some(Arc::new(still)), &target, COLD)?;
-        let certainty = Certainty::of(best.count(), &by_count);
+        let certainty = Certainty::of(best.count(), &by_count, target.error().is_none());
         let keys = from.keys.clone();
         let found = ContactHypothesis { certainty, keys, ..ContactHypothesis::of(fit, &target) };
         (!self.is_misfit(&found.fit, &target)).then_some(found)
