@@ -17,9 +17,9 @@ use tactomo::run::{Listener, Snapshot, TouchEvent};
 use tactomo_board::record::{Header, Recorder};
 use tactomo_board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo_board::source::{Opened, Recording, Source};
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Detector, Parameter, Tolerances};
 use tactomo_physics::scene::{Hand, Scene, SceneName};
-use tactomo_physics::simulate::{Simulation, try_drawn};
+use tactomo_physics::simulate::{CannotDraw, Simulation, try_drawn};
 use tactomo_touch::solve::{Method, Problem};
 
 pub use self::score::{Answer, Scored, Scorer};
@@ -35,6 +35,8 @@ pub struct Case {
     pub scan: ScanChoice,
     /// Seed of the detector as built; `None` of one that is as described.
     pub built: Option<u64>,
+    /// By how many standard deviations of its tolerance the top of a detector as built conducts better than its bottom; as drawn without it.
+    pub top_over_bottom: Option<f64>,
     /// Solver.
     pub method: Method,
     /// Seed of places and noise.
@@ -105,7 +107,11 @@ impl Case {
 
     /// What is known of its detector.
     fn detector(&self) -> String {
-        self.built.map_or_else(|| "as described".to_owned(), |seed| format!("as built {seed}"))
+        match (self.built, self.top_over_bottom) {
+            (None, _) => "as described".to_owned(),
+            (Some(seed), None) => format!("as built {seed}"),
+            (Some(seed), Some(deviations)) => format!("as built {seed}, top over bottom by {deviations}"),
+        }
     }
 }
 
@@ -122,7 +128,10 @@ fn run(case: &Case) -> anyhow::Result<Found> {
     let model = case.board.unwrap_or_else(|| BoardModel::usual(&detector));
     let detector = model.described(detector, case.built.is_some());
     let scene = Scene::new(case.scene, &detector, Hand::relative(&detector), case.seed);
-    let truth = case.built.map_or_else(|| Ok(detector.clone()), |seed| try_drawn(&detector, seed))?;
+    let truth = match case.built {
+        Some(seed) => drawn(&detector, seed, case.top_over_bottom)?,
+        None => detector.clone(),
+    };
     let simulation = Simulation::new(&truth, scene.clone(), &[], case.seed)?;
     let board = SimulatedBoard::simulate(&truth, simulation, Options { seed: case.seed, model })?;
     let clock = board.scene_clock();
@@ -164,6 +173,15 @@ fn run(case: &Case) -> anyhow::Result<Found> {
         learned_from: summary.learned.as_ref().map(|learned| learned.presses),
         learned_s: learned.zip(began).map(|(learned, began)| learned.duration_since(began).as_secs_f64()),
     })
+}
+
+/// A detector as built with a seed, whose top conducts better than its bottom by so many standard deviations of its tolerance if that is given.
+fn drawn(described: &Detector, seed: u64, top_over_bottom: Option<f64>) -> Result<Detector, CannotDraw> {
+    let Some(deviations) = top_over_bottom else { return try_drawn(described, seed) };
+    let tolerances = Tolerances { top_over_bottom_factor: 1.0, ..described.tolerances };
+    let built = try_drawn(&Detector { tolerances, ..described.clone() }, seed)?;
+    let step = deviations * described.tolerances.top_over_bottom_factor.ln();
+    Ok(built.stepped(&[(Parameter::TopOverBottom, step)]))
 }
 
 /// What came of one run.
@@ -227,4 +245,23 @@ fn first_learned(shown: &tokio::sync::watch::Receiver<Arc<Snapshot>>, ended: &At
         thread::sleep(Duration::from_millis(20));
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_detector_as_built_is_drawn_with_its_top_over_its_bottom_as_asked_and_the_rest_as_it_was() {
+        let described = Detector::default();
+        let ratio = |detector: &Detector| detector.layers[0].top_s_per_m / detector.layers[0].bottom_s_per_m;
+        let usual = drawn(&described, 9, None).unwrap();
+        let factor = described.tolerances.top_over_bottom_factor;
+        for deviations in [-2.0, 0.0, 3.0] {
+            let built = drawn(&described, 9, Some(deviations)).unwrap();
+            assert!((ratio(&built) / ratio(&described) / factor.powf(deviations) - 1.0).abs() < 1e-9);
+            assert!((built.sheet_conductance_s() / usual.sheet_conductance_s() - 1.0).abs() < 1e-9);
+            assert_eq!((&built.electrodes, &built.unevenness), (&usual.electrodes, &usual.unevenness));
+        }
+    }
 }
