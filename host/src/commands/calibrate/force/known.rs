@@ -145,7 +145,7 @@ impl Columns {
 fn sensor(times_s: &[f64], forces_n: &[f64]) -> anyhow::Result<Known> {
     ensure!(times_s.iter().all(|time_s| time_s.is_finite()), "times have to be finite numbers, but some are not");
     // A sensor at rest tells nothing, or a little less.
-    if let Some(row) = forces_n.iter().position(|force_n| !(force_n.abs() <= *FORCE_N.end())) {
+    if let Some(row) = forces_n.iter().position(|force_n| !(0.0..=*FORCE_N.end()).contains(&force_n.abs())) {
         return Err(anyhow!(
             "row {}: the force is {:?} N, but presses have up to {:?} N",
             row + 1,

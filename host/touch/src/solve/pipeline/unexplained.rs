@@ -96,3 +96,45 @@ mod tests {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::solve::{Method, Problem};
+    use tactomo_physics::detector::Detector;
+    use tactomo_physics::forward::readings_v;
+    use tactomo_physics::readings::Readings;
+    use tactomo_physics::scene::Contact;
+
+    #[test]
+    fn sound_tables_are_flagged_by_no_method_negated_ones_by_every_and_most_transposed_ones() {
+        let detector = Detector::default().taken_as_exact();
+        let problem = Problem::of(&detector).unwrap();
+        let press = |x_mm: f64, y_mm: f64, sheets: f64| {
+            Contact::flat(1e-3 * x_mm, 1e-3 * y_mm, 2.5e-3, sheets * detector.sheet_conductance_s())
+        };
+        let scenes = [
+            vec![press(12.0, -8.0, 1.0)],
+            vec![press(-3.0, 19.0, 4.0)],
+            vec![press(-24.0, 23.0, 3.0)],
+            vec![press(-14.0, 3.0, 1.0), press(17.0, 9.0, 4.0)],
+            vec![press(-6.0, -21.0, 2.0), press(4.0, 16.0, 0.5)],
+        ];
+        for method in [Method::Tikhonov, Method::Laplace, Method::Nonnegative, Method::Bsbl, Method::Contacts] {
+            let mut solver = method.build(&problem).unwrap();
+            let mut flagged = [0; 3];
+            for scene in &scenes {
+                let sound = readings_v(&problem.model.impedance_ohm(scene).unwrap(), &detector);
+                let n = sound.electrodes();
+                let negated = Readings::from_fn(n, |g, e| -sound.at(g, e));
+                let transposed = Readings::from_fn(n, |g, e| sound.at(e, g));
+                for (count, readings) in flagged.iter_mut().zip([&sound, &negated, &transposed]) {
+                    solver.reset();
+                    *count += usize::from(solver.solve(readings).unwrap().flags.misfit);
+                }
+            }
+            let [of_sound, of_negated, of_transposed] = flagged;
+            assert!((of_sound, of_negated) == (0, scenes.len()), "{}: {flagged:?}", method.name());
+            assert!(of_transposed > scenes.len() / 2, "{}: {flagged:?}", method.name());
+        }
+    }
+}
