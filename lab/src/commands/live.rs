@@ -40,13 +40,8 @@ pub struct Args {
     /// Simulates detectors as built, drawn with this seed, besides the one described; give it again for more
     #[arg(long, value_name = "SEED")]
     as_built: Vec<u64>,
-<<<<<<< HEAD
-    /// Draws those with the top conducting better than the bottom by so many standard deviations of that tolerance, below 0 worse: a
-    /// single contact on such a detector is what two on another are like
-=======
     /// Draws those with the top conducting better than the bottom by so many standard deviations of that tolerance, below 0 worse:
     /// where a single contact was taken for two, it was by 1.4 to 2.9
->>>>>>> 23c02bc6e5967dbb423aa783ce3d68fd2cd538ef
     #[arg(long, value_name = "DEVIATIONS", requires = "as_built", allow_negative_numbers = true, value_parser = options::number("standard deviations", -5.0..=5.0))]
     top_over_bottom: Option<f64>,
     /// Leaves out the detector as it is described
