@@ -90,7 +90,7 @@ pub fn check_newtons(name: &str, forces_n: &[f64]) -> Result<(), String> {
     if largest_n <= HARDEST_N {
         return Ok(());
     }
-    Err(format!("{name} goes up to {largest_n:.4} N: are these grams? 1 N is 102 g: divide them by 102"))
+    Err(format!("{name} goes up to {largest_n} N: are these grams? 1 N is 102 g: divide them by 102"))
 }
 
 impl Presses {
