@@ -59,8 +59,9 @@ fn readings_times_and_events_are_the_same_in_every_form() {
     assert!(!events.is_empty(), "the scene moves a pointer");
     assert_eq!(array(&arrays, "event_kind").values.len(), events.len());
 
-    // What the board says of its converters is in the archive: its frames are solved as the recording's are.
-    let solved = |file: &str| TACTOMO.lines(&["reconstruct", file, "--solver", "contacts", "--json"]);
+    // What the board says of its converters is in the archive: its frames are solved as the recording's are, with the same detector.
+    let solved =
+        |file: &str| TACTOMO.lines(&["reconstruct", file, "--solver", "contacts", "--detector", "square-60", "--json"]);
     for (from_recording, from_archive) in solved(&recording).iter().zip(solved(&archive)) {
         assert_eq!(from_recording["contacts"], from_archive["contacts"]);
     }

@@ -256,7 +256,10 @@ fn a_pipe_is_no_recording_and_nobody_waits_for_it() {
             other => other.to_owned(),
         };
         let args: Vec<String> = args.iter().map(named).collect();
-        let (code, message) = TACTOMO.failure(&args.iter().map(String::as_str).collect::<Vec<_>>());
+        // What a check finds is its output.
+        let output = TACTOMO.run(&args.iter().map(String::as_str).collect::<Vec<_>>());
+        let (code, message) =
+            (output.status.code(), String::from_utf8([output.stdout, output.stderr].concat()).unwrap());
         assert!(message.contains("pipe.tactomo: it is no regular file"), "{args:?}: {message}");
         assert_eq!(code, Some(1), "{args:?}: {message}");
     }
