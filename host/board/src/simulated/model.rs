@@ -109,7 +109,7 @@ const FULL_SCALE_MV: u16 = 1 << BITS;
 const NOISE_MV: f64 = 5.0;
 /// The firmware's instructions outside conversions and waits, for a frame of 16 electrodes: measured on the emulated board by the test
 /// `a_frame_costs_the_same_in_every_run` of `tests/tests/emulated_board`, which holds this figure too.
-pub const FRAME_INSTRUCTIONS: u64 = 65_898;
+pub const FRAME_INSTRUCTIONS: u64 = 65_284;
 /// Cycles of a row of 16 of them, at one and a half for an instruction.
 const ROW_CYCLES: u64 = FRAME_INSTRUCTIONS * 3 / 2 / 16;
 const ROW_ELECTRODES: f64 = 16.0;
