@@ -140,7 +140,7 @@ def test_ctrl_c_ends_the_wait_for_a_silent_board(silent_port):
 
 
 def test_a_board_that_does_not_answer_fails_where_it_is_opened(silent_port):
-    with pytest.raises(tactomo.TactomoError, match=f"{silent_port}: no board said Hello .* is the board flashed"), tactomo.Live(silent_port, solver="tikhonov"):
+    with pytest.raises(tactomo.TactomoError, match=f"{silent_port}: no board said Hello .* is the firmware on it"), tactomo.Live(silent_port, solver="tikhonov"):
         pytest.fail("it has opened")
 
 

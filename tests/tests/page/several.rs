@@ -1,5 +1,6 @@
 //! The page of several detectors in a browser.
 
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex};
@@ -216,8 +217,10 @@ fn the_body_is_turned_by_mouse_and_keyboard_and_a_click_opens_a_detector() -> Re
         async |stage| {
             stage.browser.shows(BODY, |told| told.as_i64().is_some_and(|colours| colours > 20)).await?;
             let looks = "return [...document.querySelectorAll('#body-names a')].map((name) => name.style.transform)";
-            let mut before = stage.browser.run(looks).await?;
-            let first = before.clone();
+            // Once the page has found its size.
+            let last = RefCell::default();
+            let first = stage.browser.shows(looks, |told| last.replace(told.clone()) == *told).await?;
+            let mut before = first.clone();
             let key = |key: &str| {
                 format!(
                     "const plot = document.getElementById('body-plot');

@@ -94,7 +94,10 @@ impl UnframedBytes {
 
 impl fmt::Display for UnframedBytes {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{} bytes came that were no message; {}", self.count, self.meaning())?;
+        if self.count > 0 {
+            write!(f, "{} bytes came that were no message; ", self.count)?;
+        }
+        write!(f, "{}", self.meaning())?;
         let lines = self.lines();
         if lines.is_empty() { Ok(()) } else { write!(f, ". It said: \"{}\"", lines.join("\" \"")) }
     }

@@ -163,7 +163,7 @@ mod tests {
     use std::sync::LazyLock;
     use std::sync::atomic::{AtomicBool, Ordering};
 
-    use super::super::view;
+    use super::super::{Breakdown, view};
     use super::*;
     use crate::calibrate::Calibrate;
     use crate::progress::Step;
@@ -176,7 +176,7 @@ mod tests {
             methods: vec![Method::Tikhonov, Method::TikhonovPaper],
             places: 1,
             frames: 1,
-            seed: 5,
+            seed: 2,
             quick: true,
             as_built: None,
             calibrate: Some(Calibrate::Perfect),
@@ -211,7 +211,9 @@ mod tests {
             sweep.solvers[0].breaks.clone()
         };
         assert!(breaks("Noise").is_some(), "nothing is found at 0 dB");
-        assert!(breaks("Contact impedances that differ").is_none(), "a linear image does not feel them");
+        let impedances = breaks("Contact impedances that differ");
+        let is_as_before = impedances.is_none_or(|found| found.how == Breakdown::Never);
+        assert!(is_as_before, "a linear image does not feel them, however far off it is");
     }
 
     #[test]
@@ -284,6 +286,7 @@ mod tests {
         assert_eq!((page.matches("popovertarget=").count(), page.matches("<div popover ").count()), (opened, opened));
         let row = |title: &str| &report.sweeps.iter().find(|sweep| sweep.title == title).unwrap().solvers[0];
         assert!(row("Noise").classes.silent > 0.1, "a linear image has no flags for noise");
-        assert!(row("A driving sheet that resists").margin.is_some() && row("A detector that leaks").margin.is_none());
+        let bears = |title: &str| row(title).margin.is_some();
+        assert!(bears("Noise where nothing touches") && !bears("A detector that leaks"), "it is never right there");
     }
 }

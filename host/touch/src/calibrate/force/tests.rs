@@ -288,7 +288,7 @@ fn what_tells_no_law_is_refused_with_a_reason() {
     assert!(refusal(&[&presses[6..9], &presses[6..8]].concat()).starts_with("the forces go from 2.6 N to 4.2 N only"));
     let mut wrong = presses.clone();
     wrong[3].force_n = 0.0;
-    assert!(refusal(&wrong).starts_with("press 4: its force is 0 N"));
+    assert!(refusal(&wrong).starts_with("press 4: its force is 0.0 N"));
     wrong[3] = ForcePress { conductance_s: f64::NAN, ..presses[3] };
     assert!(refusal(&wrong).starts_with("press 4: its conductance is NaN S"));
     let wild = |seed| ForceLawTrial::new((2e-3, 0.05, 0.0), 0.0, 0.3, seed).presses(&TEN_N);
