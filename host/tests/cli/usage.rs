@@ -243,7 +243,7 @@ fn a_pipe_is_no_recording_and_nobody_waits_for_it() {
         recording(&["recording", "info"]),
         recording(&["recording", "check"]),
         recording(&["recording", "cut", "--out", "OUT"]),
-        recording(&["recording", "merge", "--out", "OUT"]),
+        recording(&["recording", "merge", "--out", "OUT", "PIPE"]),
         recording(&["export", "--to", "csv", "--out", "OUT"]),
         recording(&["reconstruct"]),
         recording(&["calibrate", "rub", "--out", "OUT"]),
