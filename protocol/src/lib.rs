@@ -75,7 +75,7 @@ pub const VERSION: u8 = 4;
 /// Oldest version of which a host takes what a board says, and recordings. Before [`CODED_SINCE`] there are no coded frames; nothing else is different.
 pub const OLDEST: u8 = 3;
 /// First version with [coded frames](coded).
-const CODED_SINCE: u8 = 4;
+pub const CODED_SINCE: u8 = 4;
 /// Most electrodes that a frame can carry.
 pub const MAX_ELECTRODES: usize = 32;
 /// Fewest electrodes that a frame can carry.
