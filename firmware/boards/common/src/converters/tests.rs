@@ -310,7 +310,7 @@ fn a_code_that_is_late_is_nobodys_after_a_restart() {
         // One alone starts nothing at the other, and an electrode that is not there nothing at all.
         converters.units.calls.clear();
         assert_eq!(converters.convert([None, Some(6)])[1], Ok(200));
-        converters.convert([Some(16), None]);
+        assert_eq!(converters.convert([Some(16), None])[1], Ok(0));
         assert_eq!(converters.units.calls, ["start 1 0"]);
     }
 }
