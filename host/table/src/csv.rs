@@ -109,10 +109,12 @@ fn cells(record: &StringRecord, separator: u8) -> Vec<&str> {
     record.iter().filter(|cell| separator != b' ' || !cell.is_empty()).collect()
 }
 
-/// The number in a cell, whose decimals may have a comma.
+/// The number in a cell, whose decimals may have a comma, and whose exponent Fortran's `D`.
 fn number(cell: &str, has_decimal_commas: bool) -> Option<f64> {
     let with_point = || cell.replacen(',', ".", 1).parse().ok();
-    cell.parse().ok().or_else(|| if has_decimal_commas && !cell.contains('.') { with_point() } else { None })
+    let with_exponent = || cell.replacen(['D', 'd'], "e", 1).parse().ok();
+    let is_comma = has_decimal_commas && !cell.contains('.');
+    cell.parse().ok().or_else(|| is_comma.then(with_point)?).or_else(with_exponent)
 }
 
 /// What has been read.
@@ -154,12 +156,12 @@ impl Rows {
 
     fn add_numbers(&mut self, line: u64, cells: &[&str]) -> Result<(), String> {
         for (column, cell) in cells.iter().enumerate() {
-            let is_date = || self.names.get(column).is_some_and(|name| is_date(name)).then_some(f64::NAN);
+            let is_date = self.names.get(column).is_some_and(|name| is_date(name));
             let number = number(cell, self.has_decimal_commas)
-                .or_else(is_date)
+                .or_else(|| is_date.then_some(f64::NAN))
                 .ok_or_else(|| format!("line {line}, column {}: {}", column + 1, no_number(cell)))?;
             for (decimals, mark) in self.decimals.iter_mut().zip(['.', ',']) {
-                if decimals.is_none() && cell.contains(mark) {
+                if decimals.is_none() && !is_date && cell.contains(mark) {
                     *decimals = Some(format!("{} in line {line}", shortened(cell)));
                 }
             }
@@ -314,6 +316,7 @@ mod tests {
             "a,b\n0.5,1.25,\n-2e-3,3,\n",
             "0,5;1,25;\n-2e-3;3;\n",
             "\"0,5\";\"1,25\"\n-2e-3;3\n",
+            "0.5D0,1.25D+00\n-2.0D-03,3\n",
         ] {
             assert_eq!(parse(text).map(|(_, rows)| rows.values), Ok(vec![0.5, 1.25, -2e-3, 3.0]), "{text:?}");
         }
@@ -337,6 +340,8 @@ mod tests {
         let (names, rows) = parse("Datum/Zeit;ch0\n2026-11-28 12:00:01;0,5\n2026-11-28 12:00:02;0,25\n").unwrap();
         assert_eq!((&*names[0], rows.values[1], rows.values[3]), ("Datum/Zeit", 0.5, 0.25));
         assert!(rows.values[0].is_nan() && parse("ch0;ch1\n12:00:01;0,5\n").is_err());
+        let (_, rows) = parse("Datum;ch0\n28.11.2026;0,5\n28.11.2026;0,25\n").unwrap();
+        assert_eq!((rows.values[1], rows.values[3]), (0.5, 0.25));
     }
 
     #[test]
