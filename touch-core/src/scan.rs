@@ -125,3 +125,37 @@ fn row_scales(frame: &Frame<'_>, n: usize, drive_v: f32) -> PerElectrode {
     }
     scales
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Work;
+    use crate::frame::Errors;
+    use crate::samples::table;
+    use crate::tests::{spot, volts};
+
+    /// A contact at a place that is looked at is the best candidate, with the resistance that it has, and gains all that there is: no pattern gains
+    /// more than the sum of squares of the frame.
+    #[test]
+    fn a_contact_at_a_place_that_is_looked_at_explains_its_frame() {
+        let bytes = table();
+        let table = Table::read(&bytes).unwrap();
+        for (which, sheets) in [(22, 0.02), (57, 0.5), (84, 8.0)] {
+            let (i, j) = places(&table).nth(which).unwrap();
+            let at_m = table.middle_m(i, j);
+            let truth = spot(at_m[0], at_m[1], sheets);
+            let read = volts(&table, &[truth]);
+            let frame = Frame::of_volts(&read);
+            let errors = Errors::of(&frame, &table);
+            let mut work = Work::default();
+            let mut working = Working { done: &mut work, attend: &mut || () };
+            let [best, ..] = first(Task { table: &table, frame: &frame, errors: &errors }, &mut working);
+            let scales = row_scales(&frame, 16, table.head().drive_v);
+            let all: f32 =
+                (0..256).map(|i| (scales[i / 16] * frame.touch_v(i)).powi(2)).sum::<f32>() / errors.variance_v2;
+            assert_eq!(best.spot.at_m, at_m);
+            assert!((best.spot.ln_ohm - truth.ln_ohm).abs() < 0.02, "{best:?}, {truth:?}");
+            assert!((0.999..1.001).contains(&(best.gain / all)), "{} of {all}", best.gain);
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! Where a panic leaves its message for the next boot: memory that a reset does not clear.
 
 use core::fmt::{self, Write};
+use core::panic::Location;
 
 use heapless::String;
 
@@ -18,9 +19,8 @@ pub struct PanicRecord<'a>(pub &'a mut [u8; RECORD_BYTES]);
 impl PanicRecord<'_> {
     /// Writes down where and why, cut at the longest message: of the path the last two parts, since a crate's folder is long and the same for all
     /// its files.
-    pub fn store(&mut self, panic: &core::panic::PanicInfo) {
-        let place = panic.location().map(|place| (place.file(), place.line()));
-        self.store_text(&text(place, panic.message()).0);
+    pub fn store(&mut self, place: Option<&Location<'_>>, message: impl fmt::Display) {
+        self.store_text(&text(place.map(|place| (place.file(), place.line())), message).0);
     }
 
     pub(crate) fn store_text(&mut self, text: &String<MAX_TEXT>) {
@@ -95,11 +95,10 @@ mod tests {
         let mut memory = [0xA5; RECORD_BYTES];
         let mut record = PanicRecord(&mut memory);
         assert_eq!(record.take(), None);
-        let mut text = Cut::default();
-        let long = "x".repeat(MAX_TEXT + 10);
-        assert_eq!(write!(text, "main.rs:7: {long}"), Ok(()));
-        record.store_text(&text.0);
-        assert_eq!(record.take().as_deref(), Some(&*format!("main.rs:7: {}", &long[..MAX_TEXT - 11])));
+        let (here, long) = (Location::caller(), "x".repeat(MAX_TEXT));
+        record.store(Some(here), format_args!("{long}"));
+        let place = format!("src/panic_record.rs:{}: ", here.line());
+        assert_eq!(record.take().as_deref(), Some(&*format!("{place}{}", &long[place.len()..])));
         assert_eq!(record.take(), None);
     }
 

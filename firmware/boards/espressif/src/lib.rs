@@ -78,7 +78,7 @@ fn panic_record() -> PanicRecord<'static> {
 
 #[panic_handler]
 fn panic(panic: &PanicInfo) -> ! {
-    panic_record().store(panic);
+    panic_record().store(panic.location(), panic.message());
     esp_hal::system::software_reset()
 }
 

@@ -26,7 +26,7 @@ fn panic_record() -> PanicRecord<'static> {
 
 #[panic_handler]
 fn panic(panic: &PanicInfo) -> ! {
-    panic_record().store(panic);
+    panic_record().store(panic.location(), panic.message());
     cortex_m::peripheral::SCB::sys_reset()
 }
 

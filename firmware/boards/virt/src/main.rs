@@ -279,6 +279,6 @@ impl Chip for VirtChip<'_> {
 
 #[panic_handler]
 fn panic(panic: &PanicInfo) -> ! {
-    machine::panic_record().store(panic);
+    machine::panic_record().store(panic.location(), panic.message());
     machine::reset()
 }
