@@ -72,5 +72,6 @@ mod tests {
             let (_, floor, ceiling) = ends(&curve(16, calibrated))[0];
             assert!(floor < ceiling && ceiling <= MAX_CODE, "{floor} to {ceiling}");
         }
+        assert_eq!(ends(&curve(16, &|_| 0))[0], (16, 0, 1));
     }
 }

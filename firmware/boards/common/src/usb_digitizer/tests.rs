@@ -238,13 +238,24 @@ fn reports_go_when_a_host_has_set_the_port_up_and_took_the_last() {
     let report = [1; REPORT_BYTES];
     assert!(!host.screen.send(&report));
     host.configure();
+    // What a host asks for before anything was sent: nothing touches.
+    let asked = |host: &mut Host| host.ask(0xA1, 1, 0x0100 | u16::from(hid::TOUCH_ID), SCREEN, 64).unwrap();
+    let nothing = asked(&mut host);
+    assert!(nothing.len() == REPORT_BYTES && nothing[0] == hid::TOUCH_ID && nothing[1..].iter().all(|byte| *byte == 0));
     assert!(host.screen.send(&report) && !host.screen.send(&report));
     assert_eq!(host.take(3).as_deref(), Some(&report[..]));
     assert!(host.screen.send(&report));
-    let last = host.ask(0xA1, 1, 0x0100 | u16::from(hid::TOUCH_ID), SCREEN, 64);
-    assert_eq!(last.as_deref(), Some(&report[..]));
+    assert_eq!(asked(&mut host), report);
     host.port.wire().is_reset = true;
     host.poll();
     host.take(3);
     assert!(!host.screen.send(&report));
+    host.configure();
+    assert_eq!(asked(&mut host), nothing);
+}
+
+#[test]
+fn a_screen_that_was_never_told_of_a_host_sends_nothing() {
+    let bus = UsbBusAllocator::new(Port::default());
+    assert!(!UsbDigitizer::new(&bus).send(&[1; REPORT_BYTES]));
 }
