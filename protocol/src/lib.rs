@@ -72,7 +72,7 @@ pub use scope::{MAX_PLAN_ROWS, MAX_ROWS, Plan, Scope};
 
 /// Version of the protocol that this crate speaks: 1 to 15. A board obeys no other; a host takes those from [`OLDEST`] on too.
 pub const VERSION: u8 = 4;
-/// Oldest version of which a host takes what a board says, and recordings. Before [`CODED_SINCE`] there are no coded frames; nothing else is different.
+/// Oldest version of which a host takes what a board says, and recordings. Before [`CODED_SINCE`] there are no coded frames; all else is the same but for the time of a board.
 pub const OLDEST: u8 = 3;
 /// First version with [coded frames](coded).
 pub const CODED_SINCE: u8 = 4;
