@@ -47,11 +47,11 @@ fn gallery() -> Result<()> {
         Ok(())
     })?;
     let mut text = "# Every state of the page\n\nEach sheet shows the same state in windows of 1920 x 1080, 1366 x 768, 390 x 844, 1280 x 580 and 844 x 390. \
-         What the page is told is made up, so that every state is there; the page is the real one.\n\
+         The page is the real one; what it is told is made up, so that every state occurs.\n\
          `TACTOMO_GALLERY=$PWD/docs cargo test -p tactomo-tests --test page gallery` takes them again and writes this document.\n"
         .to_owned();
     for state in &STATES {
-        write!(text, "\n## {}\n{}\n\n![{}](page/{}.webp)\n", state.name, state.says, state.says, state.name)?;
+        write!(text, "\n## {}\n{}\n\n![{}](page/{}.webp)\n", state.name, state.says, state.name, state.name)?;
     }
     Ok(std::fs::write(folder.join("page-states.md"), text)?)
 }

@@ -57,9 +57,9 @@ pub const STATES: [State; 18] = [
     State { dark: true, ..state("several-dark", "The same in dark colours.", |script| script.solution(hand())) },
     State {
         click: Some("view-space"),
-        ..state("space", "In space: height is pressure.", |script| script.solution(hand()))
+        ..state("space", "In 3-D: height is pressure.", |script| script.solution(hand()))
     },
-    state("line", "A line that touches: its ends in the table.", |script| {
+    state("line", "A line: its ends are in the table.", |script| {
         let line = FoundLine {
             from_m: [-18.0e-3, -6.0e-3],
             to_m: [15.0e-3, 12.0e-3],
@@ -69,7 +69,7 @@ pub const STATES: [State; 18] = [
         };
         script.solution(Solution { shape: Some(FoundShape::Line(line)), ..Solution::default() });
     }),
-    state("ring", "A ring that touches.", |script| {
+    state("ring", "A ring: its middle is in the table.", |script| {
         let ring = FoundRing {
             centre_m: [4e-3, -3e-3],
             radius_m: 11e-3,
@@ -83,7 +83,7 @@ pub const STATES: [State; 18] = [
         let alternative = Some(Alternative { contacts: 3, certainty: 0.3 });
         script.solution(Solution { certainty: Some(0.66), alternative, ..sure(hand().contacts[..4].to_vec()) });
     }),
-    state("looking", "Something has just touched: what it is, is not known yet.", |script| {
+    state("looking", "Something has just touched, and is still searched for.", |script| {
         let choice = Some(Choice { what: "searching".to_owned(), why: String::new() });
         script.patch([-6.0, 8.0], 3.0);
         script.set(|snapshot| {
@@ -92,11 +92,11 @@ pub const STATES: [State; 18] = [
             }
         });
     }),
-    state("electrode", "A broken wire: its electrode is crossed out, and the rest goes on.", |script| {
+    state("electrode", "A broken wire: its electrode is crossed out, and left out.", |script| {
         let flags = Flags { excluded: vec![3], ..Flags::default() };
         script.solution(Solution { flags, ..sure(vec![contact(1, [9.0, -6.0], 2.4e-4)]) });
     }),
-    state("notice", "What the program has to say stands in one line on top.", |script| {
+    state("notice", "A notice of the program, in one line on top.", |script| {
         script.solution(sure(vec![contact(1, [9.0, -6.0], 2.4e-4)]));
         script.set(|snapshot| {
             snapshot.refused.control =
@@ -107,7 +107,7 @@ pub const STATES: [State; 18] = [
         script.solution(hand());
         script.set(|snapshot| snapshot.link = LinkState::Lost("/dev/ttyUSB0 is gone".to_owned()));
     }),
-    state("recording", "A recording that is played.", |script| {
+    state("recording", "A recording, played.", |script| {
         script.solution(hand());
         script.set(|snapshot| snapshot.playing = played());
     }),
@@ -119,16 +119,12 @@ pub const STATES: [State; 18] = [
             script.set(|snapshot| snapshot.calibrating = Some(Arc::new(calibrating())));
         },
     ),
-    state("calibrated", "Calibrated: better on presses that were set aside, so it is recommended.", |script| {
+    state("calibrated", "A new calibration that is better on presses set aside, so it is recommended.", |script| {
         script.set(|snapshot| snapshot.calibrating = Some(Arc::new(calibrated())));
     }),
-    state(
-        "kept",
-        "Not better on presses that were set aside: the page says to keep the present one, and why.",
-        |script| {
-            script.set(|snapshot| snapshot.calibrating = Some(Arc::new(kept())));
-        },
-    ),
+    state("kept", "A new calibration that is no better: the page says to keep the present one, and why.", |script| {
+        script.set(|snapshot| snapshot.calibrating = Some(Arc::new(kept())));
+    }),
 ];
 
 impl State {
