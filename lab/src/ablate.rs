@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Hand, Scene, SceneName};
-use tactomo_study::contacts::{self, Trial};
+use tactomo_study::bank::{self, Case, Scenes, Trial};
 use tactomo_study::stopwatch::timed;
 use tactomo_study::{Experiment, StudyError};
 use tactomo_touch::solve::{Method, Problem, Threshold, thresholds};
@@ -138,18 +138,17 @@ fn recordings(plan: &Plan) -> Result<Vec<Recording>, StudyError> {
 fn figures(plan: &Plan, recordings: &[Recording]) -> Result<Figures, StudyError> {
     let mut found = Figures::default();
     for (which, as_built) in [None, Some(plan.seed)].into_iter().enumerate() {
-        let plan = contacts::Plan {
-            detectors: vec![Detector::default()],
-            method: Method::Auto,
+        let case = Case::of("", Scenes::Random, vec![Detector::default()]);
+        let plan = bank::Plan {
+            cases: vec![Case { built: as_built.into_iter().collect(), ..case }],
+            methods: vec![Method::Auto],
             scenes: plan.scenes,
             frames: 1,
             threads: 1,
             worst: plan.scenes,
             seed: plan.seed,
-            as_built,
-            rub: 0,
         };
-        let report = contacts::run(&plan, "", &mut |_| ())?;
+        let report = bank::run(&plan, "", &mut |_| ())?;
         if let Some(all) = report.rows.iter().find(|row| row.class == "all") {
             found.cold[which] = all.scenes.as_ref().map_or(0.0, |scenes| scenes.all_found);
             found.over_bound[which] = all.contacts.over_bound.map_or(f64::NAN, |over| over.high);

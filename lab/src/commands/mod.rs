@@ -2,6 +2,7 @@
 
 #[cfg(feature = "ablation")]
 mod ablate;
+mod bank;
 mod design;
 mod learn;
 mod live;
@@ -26,6 +27,7 @@ pub struct Cli {
 enum Command {
     Tradeoff(tradeoff::Args),
     Stability(stability::Args),
+    Bank(bank::Args),
     Study(study::Args),
     Validate(validate::Args),
     Design(Box<design::Args>),
@@ -41,6 +43,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Tradeoff(args) => tradeoff::run(&args),
         Command::Stability(args) => stability::run(&args),
+        Command::Bank(args) => bank::run(&args),
         Command::Study(args) => study::run(&args),
         Command::Validate(args) => validate::run(&args),
         Command::Design(args) => design::run(&args),

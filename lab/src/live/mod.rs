@@ -17,9 +17,9 @@ use tactomo::run::{Listener, Snapshot, TouchEvent};
 use tactomo_board::record::{Header, Recorder};
 use tactomo_board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo_board::source::{Opened, Recording, Source};
-use tactomo_physics::detector::{Detector, Parameter, Tolerances};
+use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::{Hand, Scene, SceneName};
-use tactomo_physics::simulate::{CannotDraw, Simulation, try_drawn};
+use tactomo_physics::simulate::{Simulation, drawn_top_over_bottom, try_drawn};
 use tactomo_touch::solve::{Method, Problem};
 
 pub use self::score::{Answer, Scored, Scorer};
@@ -129,7 +129,10 @@ fn run(case: &Case) -> anyhow::Result<Found> {
     let detector = model.described(detector, case.built.is_some());
     let scene = Scene::new(case.scene, &detector, Hand::relative(&detector), case.seed);
     let truth = match case.built {
-        Some(seed) => drawn(&detector, seed, case.top_over_bottom)?,
+        Some(seed) => match case.top_over_bottom {
+            Some(deviations) => drawn_top_over_bottom(&detector, seed, deviations)?,
+            None => try_drawn(&detector, seed)?,
+        },
         None => detector.clone(),
     };
     let simulation = Simulation::new(&truth, scene.clone(), &[], case.seed)?;
@@ -173,15 +176,6 @@ fn run(case: &Case) -> anyhow::Result<Found> {
         learned_from: summary.learned.as_ref().map(|learned| learned.presses),
         learned_s: learned.zip(began).map(|(learned, began)| learned.duration_since(began).as_secs_f64()),
     })
-}
-
-/// A detector as built with a seed, whose top conducts better than its bottom by so many standard deviations of its tolerance if that is given.
-fn drawn(described: &Detector, seed: u64, top_over_bottom: Option<f64>) -> Result<Detector, CannotDraw> {
-    let Some(deviations) = top_over_bottom else { return try_drawn(described, seed) };
-    let tolerances = Tolerances { top_over_bottom_factor: 1.0, ..described.tolerances };
-    let built = try_drawn(&Detector { tolerances, ..described.clone() }, seed)?;
-    let step = deviations * described.tolerances.top_over_bottom_factor.ln();
-    Ok(built.stepped(&[(Parameter::TopOverBottom, step)]))
 }
 
 /// What came of one run.
@@ -245,23 +239,4 @@ fn first_learned(shown: &tokio::sync::watch::Receiver<Arc<Snapshot>>, ended: &At
         thread::sleep(Duration::from_millis(20));
     }
     None
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_detector_as_built_is_drawn_with_its_top_over_its_bottom_as_asked_and_the_rest_as_it_was() {
-        let described = Detector::default();
-        let ratio = |detector: &Detector| detector.layers[0].top_s_per_m / detector.layers[0].bottom_s_per_m;
-        let usual = drawn(&described, 9, None).unwrap();
-        let factor = described.tolerances.top_over_bottom_factor;
-        for deviations in [-2.0, 0.0, 3.0] {
-            let built = drawn(&described, 9, Some(deviations)).unwrap();
-            assert!((ratio(&built) / ratio(&described) / factor.powf(deviations) - 1.0).abs() < 1e-9);
-            assert!((built.sheet_conductance_s() / usual.sheet_conductance_s() - 1.0).abs() < 1e-9);
-            assert_eq!((&built.electrodes, &built.unevenness), (&usual.electrodes, &usual.unevenness));
-        }
-    }
 }

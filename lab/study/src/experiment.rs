@@ -12,7 +12,7 @@ use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
 use tactomo_physics::readings::{Range, Readings};
 use tactomo_physics::scene::{Contact, Touch};
-use tactomo_physics::simulate::{Fault, FaultError, Measurement, drawn, finer_model};
+use tactomo_physics::simulate::{CannotDraw, Fault, FaultError, Measurement, drawn, finer_model};
 use tactomo_touch::solve::{Problem, SolveError};
 
 /// Frames before the first that the baseline is taken from, as many as live takes. At rest it is never zero: the converter cuts off what
@@ -54,6 +54,9 @@ pub enum StudyError {
         /// What is wrong with what was drawn.
         wrong: Wrong,
     },
+    /// What was built cannot be drawn.
+    #[error(transparent)]
+    Draw(#[from] CannotDraw),
     /// A detector on which not all scenes can be.
     #[error("detector {detector} is curved: studies press flat detectors, where contacts of any shape have a model")]
     Curved {
@@ -167,7 +170,15 @@ impl Experiment {
         let built = drawn(&Detector { tolerances, ..self.detector.clone() }, seed);
         let name = || self.detector.name.clone();
         built.check().map_err(|wrong| StudyError::AsBuilt { detector: name(), seed, wrong })?;
-        Ok(Self { problem: self.tolerant().problem, ..self.with_truth(&built)? })
+        self.made_as(&built)
+    }
+
+    /// The same, in truth a detector as it was built, of which solvers know the description and its tolerances.
+    ///
+    /// # Errors
+    /// [`StudyError`] if it cannot be modelled.
+    pub fn made_as(&self, built: &Detector) -> Result<Self, StudyError> {
+        Ok(Self { problem: self.tolerant().problem, ..self.with_truth(built)? })
     }
 
     /// The same, whose solvers know the tolerances of its description: what they make of those is made once for all copies.

@@ -2,11 +2,11 @@
 //!
 //! Data always come from a [finer model](tactomo_physics::simulate::finer_model) than any that is inverted, through wires, noise and converter.
 
+pub mod bank;
 mod bound;
 pub mod built;
 mod calibrate;
 pub mod case;
-pub mod contacts;
 mod experiment;
 pub mod growth;
 mod json_file;

@@ -89,6 +89,17 @@ pub fn try_drawn(detector: &Detector, seed: u64) -> Result<Detector, CannotDraw>
     }
 }
 
+/// The detector that [`try_drawn`] gives, but its top conducts better than its bottom by so many standard deviations of that tolerance.
+///
+/// # Errors
+/// As for [`try_drawn`].
+pub fn drawn_top_over_bottom(detector: &Detector, seed: u64, deviations: f64) -> Result<Detector, CannotDraw> {
+    let tolerances = Tolerances { top_over_bottom_factor: 1.0, ..detector.tolerances };
+    let built = try_drawn(&Detector { tolerances, ..detector.clone() }, seed)?;
+    let step = deviations * detector.tolerances.top_over_bottom_factor.ln();
+    Ok(built.stepped(&[(Parameter::TopOverBottom, step)]))
+}
+
 /// A step of every parameter but the offsets, which are the board's, and the driving layer, which is a [`Fault`].
 fn steps(detector: &Detector, tolerances: &Tolerances, noise: &mut Noise) -> Vec<(Parameter, f64)> {
     let step = |parameter: Parameter| (parameter, tolerances.deviation(detector, parameter) * noise.normal());
@@ -154,6 +165,20 @@ mod tests {
         assert_eq!(of(3), of(3));
         assert_ne!(of(3), of(4));
         assert_eq!(as_built(&detector, &[], 3), detector);
+    }
+
+    #[test]
+    fn a_detector_as_built_has_its_top_over_its_bottom_as_asked_and_the_rest_as_it_was() {
+        let described = Detector::default();
+        let ratio = |detector: &Detector| detector.layers[0].top_s_per_m / detector.layers[0].bottom_s_per_m;
+        let usual = try_drawn(&described, 9).unwrap();
+        let factor = described.tolerances.top_over_bottom_factor;
+        for deviations in [-2.0, 0.0, 3.0] {
+            let built = drawn_top_over_bottom(&described, 9, deviations).unwrap();
+            assert!((ratio(&built) / ratio(&described) / factor.powf(deviations) - 1.0).abs() < 1e-9);
+            assert!((built.sheet_conductance_s() / usual.sheet_conductance_s() - 1.0).abs() < 1e-9);
+            assert_eq!((&built.electrodes, &built.unevenness), (&usual.electrodes, &usual.unevenness));
+        }
     }
 
     #[test]

@@ -17,7 +17,7 @@ mod noise;
 use crate::readings::Readings;
 
 pub use board::Simulation;
-pub use built::{CannotDraw, as_built, drawn, try_drawn};
+pub use built::{CannotDraw, as_built, drawn, drawn_top_over_bottom, try_drawn};
 pub use controls::Controls;
 pub use fault::{Fault, FaultError};
 pub use foam::{Foam, Pressed};

@@ -3,7 +3,7 @@
 use super::figure;
 use crate::figure::Figure;
 
-/// Classes of `study contacts`, and what ids call them.
+/// Classes of `bank`, and what ids call them.
 const CLASSES: [(&str, &str, bool); 15] = [
     ("1 contact", "1", true),
     ("2 contacts", "2", true),

@@ -2,7 +2,6 @@
 
 mod args;
 mod built;
-mod contacts;
 mod design;
 mod growth;
 mod picard;
@@ -14,7 +13,7 @@ pub use self::args::StudyArgs;
 ///
 /// Examples:
 ///   tactomo-lab study materials --out materials.html
-///   tactomo-lab study contacts --scenes 60
+///   tactomo-lab study surface --quick
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -25,7 +24,6 @@ pub struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Study {
     Built(built::Args),
-    Contacts(contacts::Args),
     Growth(growth::Args),
     Picard(picard::Args),
     Surface(surface::Args),
@@ -37,7 +35,6 @@ enum Study {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.study {
         Study::Built(args) => built::run(args),
-        Study::Contacts(args) => contacts::run(args),
         Study::Growth(args) => growth::run(args),
         Study::Picard(args) => picard::run(args),
         Study::Surface(args) => surface::run(args),

@@ -3,7 +3,7 @@
 //! One name for one thing, in standard deviations, in squares of those ("squared deviations", as sums of squares and scores are), in nats
 //! (logarithms of odds or of evidence), or in shares, each with its source or the measurement behind it. Constants of a computation, as steps of a fit
 //! or sizes of a grid, stay with it. Those of electrodes that cannot be right are in `health`. Whoever changes one runs `tactomo-lab
-//! ablate`, which shows what it is worth, and `cargo lab study contacts`, both on a seed that was not used to choose it.
+//! ablate`, which shows what it is worth, and `cargo lab bank`, both on a seed that was not used to choose it.
 
 use super::ablation::thresholds;
 

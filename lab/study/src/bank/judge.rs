@@ -1,4 +1,4 @@
-//! An answer to random contacts: what the [judge](crate::judge) says of each, and how far it is from the bound.
+//! An answer to a scene: what the [judge](crate::judge) says of each, and how far it is from the bound.
 
 use super::scenes::scale;
 use crate::bound::Bound;
@@ -17,21 +17,23 @@ const CORNER: f64 = 0.72;
 /// A contact is at a wall if its centre is within so many radii of it.
 const WALL_RADII: f64 = 1.5;
 
-/// An answer, contact by contact.
+/// An answer, contact by contact: discs that touch, and what was found.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Judged {
-    /// What touches.
+    /// Discs that touch.
     pub truth: Vec<TrueContact>,
     /// What was found.
     pub found: Vec<FoundContact>,
     /// Which of the found ones are not there, visible or not.
     pub invented: Vec<usize>,
-    /// Whether the answer is contacts, and no shape and no image.
-    pub is_contacts: bool,
+    /// Whether the answer is of the kind that touches: contacts, a line, a ring, or an image of any other shape.
+    pub is_kind_right: bool,
     /// Whether the solver says that its answer does not explain the readings.
     pub misfit: bool,
     /// Probability that the solver claims for its count.
     pub certainty: Option<f64>,
+    /// Another number of contacts that the answer names, if it does.
+    pub alternative: Option<usize>,
     /// The solver's own residual.
     pub residual: Option<f64>,
     /// What the solver chose and why, if it says so.
@@ -86,10 +88,10 @@ pub struct Match {
 }
 
 impl Judged {
-    /// Compares a solution with the contacts that are there and the bounds of their errors.
-    pub(super) fn new(detector: &Detector, truth: &[Contact], bounds: Option<&[Bound]>, solution: &Solution) -> Self {
-        let touches: Vec<Touch> = truth.iter().copied().map(Touch::from).collect();
-        let judge::Judged { found, near, is_kind_right, .. } = judge::Judged::of(wrong_m(detector), &touches, solution);
+    /// Compares a solution with what touches and with the bounds of the errors of its discs.
+    pub(super) fn new(detector: &Detector, touches: &[Touch], bounds: Option<&[Bound]>, solution: &Solution) -> Self {
+        let judge::Judged { found, truth, near, is_kind_right } =
+            judge::Judged::of(wrong_m(detector), touches, solution);
         let bound_of = |index: usize| bounds.and_then(|bounds| bounds.get(index)).copied();
         let is_place_of = |found: &FoundContact, index: usize| {
             let distance_m = (found.x_m - truth[index].x_m).hypot(found.y_m - truth[index].y_m);
@@ -120,9 +122,10 @@ impl Judged {
             truth: truth.iter().enumerate().map(of).collect(),
             found: found.to_vec(),
             invented,
-            is_contacts: is_kind_right,
+            is_kind_right,
             misfit: solution.flags.misfit,
             certainty: solution.certainty,
+            alternative: solution.alternative.map(|other| other.contacts),
             residual: solution.residual,
             choice: solution.choice.as_ref().map(|choice| format!("{}: {}", choice.what, choice.why)),
         }
@@ -135,18 +138,23 @@ impl Judged {
 
     /// Whether as many contacts were found as are there.
     pub fn is_count_right(&self) -> bool {
-        self.is_contacts && self.found.len() == self.truth.len()
+        self.is_kind_right && self.found.len() == self.truth.len()
     }
 
     /// Whether as many contacts were found as are there, but for invisible ones.
     pub fn is_visible_count_right(&self) -> bool {
-        self.is_contacts && (self.visible().count()..=self.truth.len()).contains(&self.found.len())
+        self.is_kind_right && (self.visible().count()..=self.truth.len()).contains(&self.found.len())
     }
 
     /// Contacts invented, visible ones missed, and a shape or an image that is not there.
     pub fn faults(&self) -> usize {
         let missed = self.visible().filter(|contact| contact.found.is_none()).count();
-        self.invented.len() + missed + usize::from(!self.is_contacts)
+        self.invented.len() + missed + usize::from(!self.is_kind_right)
+    }
+
+    /// Whether the answer says itself that it may be wrong: by its flag, or by the right number of contacts as its alternative.
+    pub fn is_warned(&self) -> bool {
+        self.misfit || self.alternative == Some(self.truth.len())
     }
 
     /// The largest error over its bound of the visible ones; 0 if none of them was found.
@@ -207,13 +215,17 @@ mod tests {
         Contact::flat(1e-3 * x_mm, 1e-3 * y_mm, 2e-3, 1e-3)
     }
 
+    fn touches(truth: &[Contact]) -> Vec<Touch> {
+        truth.iter().copied().map(Touch::from).collect()
+    }
+
     fn seen(x_mm: f64, y_mm: f64) -> FoundContact {
         FoundContact::flat(1e-3 * x_mm, 1e-3 * y_mm, 1e-3)
     }
 
     fn judged(truth: &[Contact], bounds: &[Bound], contacts: Vec<FoundContact>) -> Judged {
         let solution = Solution { contacts, flags: Flags { misfit: true, ..Flags::default() }, ..Solution::default() };
-        Judged::new(&Detector::default(), truth, Some(bounds), &solution)
+        Judged::new(&Detector::default(), &touches(truth), Some(bounds), &solution)
     }
 
     #[test]
@@ -242,14 +254,14 @@ mod tests {
     #[test]
     fn a_line_where_nothing_visible_touches_is_a_fault() {
         let line = Solution { shape: Some(FoundShape::Line(FoundLine::default())), ..Solution::default() };
-        let answer = Judged::new(&Detector::default(), &[there(0.0, 0.0)], Some(&[FAINT]), &line);
+        let answer = Judged::new(&Detector::default(), &touches(&[there(0.0, 0.0)]), Some(&[FAINT]), &line);
         assert_eq!((answer.faults(), answer.is_visible_count_right()), (1, false));
     }
 
     #[test]
     fn without_a_bound_nothing_is_visible() {
         let solution = Solution { contacts: vec![seen(0.0, 0.0)], ..Solution::default() };
-        let answer = Judged::new(&Detector::default(), &[there(0.0, 0.0)], None, &solution);
+        let answer = Judged::new(&Detector::default(), &touches(&[there(0.0, 0.0)]), None, &solution);
         assert_eq!((answer.visible().count(), answer.faults()), (0, 0));
         assert!(answer.truth[0].found.is_some_and(|found| found.over_bound.is_none()));
     }

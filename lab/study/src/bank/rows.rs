@@ -1,8 +1,8 @@
 //! Figures of classes of scenes and of contacts.
 
-use super::Trial;
 use super::judge::{Match, Place, TrueContact};
 use super::scenes::MAX_CONTACTS;
+use super::{Case, Trial};
 use crate::score::quantiles;
 
 /// Strongest over lightest contact from which a scene is one of contrasts.
@@ -14,6 +14,10 @@ const SURE: [f64; 4] = [0.95, 0.8, 0.5, 0.0];
 /// Figures of a class.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Row {
+    /// Name of the case.
+    pub case: String,
+    /// Name of the solver.
+    pub solver: String,
     /// What it is.
     pub class: &'static str,
     /// Of its scenes, if it is a class of scenes.
@@ -33,10 +37,14 @@ pub struct SceneFigures {
     pub all_found: f64,
     /// Share that the solver flags as misfit.
     pub misfit: f64,
+    /// Of those that are wrong, the share that is flagged as misfit or names the right number of contacts as its alternative.
+    pub warned: Option<f64>,
     /// Time of a cold start (us): median, 95 % below.
     pub cold_us: Quantiles,
     /// Time of each next frame (us): median, 95 % below.
     pub next_us: Quantiles,
+    /// Both over the time of `tikhonov` on the same frames: medians.
+    pub over_tikhonov: [f64; 2],
 }
 
 /// Figures of contacts: but for the first two, of those visible that were found. `None` where there is none.
@@ -68,6 +76,10 @@ pub struct Quantiles {
 /// How often answers that claim much alike are right: that as many were found as are there, but for invisible ones.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Claims {
+    /// Name of the case.
+    pub case: String,
+    /// Name of the solver.
+    pub solver: String,
     /// Least that they claim of their count; `None` of those that claim nothing.
     pub least: Option<f64>,
     /// How many.
@@ -79,55 +91,68 @@ pub struct Claims {
 }
 
 /// What answers claim, from the surest on; classes without any are left out.
-pub(super) fn claims(trials: &[Trial]) -> Vec<Claims> {
+pub(super) fn claims(case: &Case, solver: &str, trials: &[&Trial]) -> Vec<Claims> {
     let class = |claimed: Option<f64>| claimed.and_then(|claimed| SURE.into_iter().find(|least| claimed >= *least));
     let of = |least: Option<f64>| {
         let all: Vec<_> =
             trials.iter().map(|trial| &trial.judged).filter(|judged| class(judged.certainty) == least).collect();
         let right = share(all.iter().map(|judged| judged.is_visible_count_right()))?;
         let claimed: Option<f64> = all.iter().map(|judged| judged.certainty).sum();
-        Some(Claims { least, scenes: all.len(), claimed: claimed.map(|sum| sum / all.len() as f64), right })
+        let claimed = claimed.map(|sum| sum / all.len() as f64);
+        Some(Claims { case: case.name.clone(), solver: solver.to_owned(), least, scenes: all.len(), claimed, right })
     };
     SURE.map(Some).into_iter().chain([None]).filter_map(of).collect()
 }
 
-/// Figures of all classes.
-pub(super) fn rows(trials: &[Trial]) -> Vec<Row> {
+/// Figures of all classes of which there is something.
+pub(super) fn rows(case: &Case, solver: &str, trials: &[&Trial]) -> Vec<Row> {
     const COUNTS: [&str; MAX_CONTACTS] = ["1 contact", "2 contacts", "3 contacts", "4 contacts", "5 contacts"];
-    let by_count = (1..).zip(COUNTS).map(|(count, class)| of_scenes(class, trials, |t| t.judged.truth.len() == count));
+    let of_scenes = |class: &'static str, is_of_it: &dyn Fn(&Trial) -> bool| {
+        let trials: Vec<&Trial> = trials.iter().copied().filter(|trial| is_of_it(trial)).collect();
+        let contacts = ContactFigures::of(trials.iter().flat_map(|trial| trial.judged.visible()));
+        (class, SceneFigures::of(&trials), contacts)
+    };
+    let of_contacts = |class: &'static str, is_of_it: &dyn Fn(&TrueContact) -> bool| {
+        let contacts = trials.iter().flat_map(|trial| trial.judged.visible()).filter(|contact| is_of_it(contact));
+        (class, None, ContactFigures::of(contacts))
+    };
     let of_sheets = |range: std::ops::Range<f64>| move |contact: &TrueContact| range.contains(&contact.sheets);
     let of_radii_mm =
         |range: std::ops::Range<f64>| move |contact: &TrueContact| range.contains(&(1e3 * contact.scaled_radius_m));
+    let by_count = (1..).zip(COUNTS).map(|(count, class)| of_scenes(class, &|t| t.judged.truth.len() == count));
+    let by_kind = case.scenes.kinds().iter().map(|kind| of_scenes(kind, &|trial| trial.kind == Some(*kind)));
     let others = [
-        of_scenes("all", trials, |_| true),
-        of_scenes("contrast above 100", trials, |trial| trial.judged.contrast() > CONTRAST),
-        of_contacts("in corners", trials, |contact| contact.place == Place::Corner),
-        of_contacts("at walls", trials, |contact| contact.place == Place::Wall),
-        of_contacts("radius below 2 mm", trials, of_radii_mm(0.0..2.0)),
-        of_contacts("radius 2 to 3.5 mm", trials, of_radii_mm(2.0..3.5)),
-        of_contacts("radius above 3.5 mm", trials, of_radii_mm(3.5..f64::INFINITY)),
-        of_contacts("below 0.1 sheets", trials, of_sheets(0.0..0.1)),
-        of_contacts("0.1 to 1 sheets", trials, of_sheets(0.1..1.0)),
-        of_contacts("above 1 sheet", trials, of_sheets(1.0..f64::INFINITY)),
+        of_scenes("all", &|_| true),
+        of_scenes("contrast above 100", &|trial| trial.judged.contrast() > CONTRAST),
+        of_contacts("in corners", &|contact| contact.place == Place::Corner),
+        of_contacts("at walls", &|contact| contact.place == Place::Wall),
+        of_contacts("radius below 2 mm", &of_radii_mm(0.0..2.0)),
+        of_contacts("radius 2 to 3.5 mm", &of_radii_mm(2.0..3.5)),
+        of_contacts("radius above 3.5 mm", &of_radii_mm(3.5..f64::INFINITY)),
+        of_contacts("below 0.1 sheets", &of_sheets(0.0..0.1)),
+        of_contacts("0.1 to 1 sheets", &of_sheets(0.1..1.0)),
+        of_contacts("above 1 sheet", &of_sheets(1.0..f64::INFINITY)),
     ];
-    by_count.chain(others).collect()
-}
-
-fn of_scenes(class: &'static str, trials: &[Trial], is_of_it: impl Fn(&Trial) -> bool) -> Row {
-    let trials: Vec<&Trial> = trials.iter().filter(|trial| is_of_it(trial)).collect();
-    let contacts = ContactFigures::of(trials.iter().flat_map(|trial| trial.judged.visible()));
-    Row { class, scenes: SceneFigures::of(&trials), contacts }
-}
-
-fn of_contacts(class: &'static str, trials: &[Trial], is_of_it: impl Fn(&TrueContact) -> bool) -> Row {
-    let contacts = trials.iter().flat_map(|trial| trial.judged.visible()).filter(|contact| is_of_it(contact));
-    Row { class, scenes: None, contacts: ContactFigures::of(contacts) }
+    let all = by_count.chain(by_kind).chain(others);
+    let has_some =
+        |(_, scenes, contacts): &(_, Option<SceneFigures>, ContactFigures)| scenes.is_some() || contacts.visible > 0;
+    let row =
+        |(class, scenes, contacts)| Row { case: case.name.clone(), solver: solver.to_owned(), class, scenes, contacts };
+    all.filter(has_some).map(row).collect()
 }
 
 impl SceneFigures {
     fn of(trials: &[&Trial]) -> Option<Self> {
         let share_of = |is: &dyn Fn(&Trial) -> bool| share(trials.iter().map(|trial| is(trial)));
+        let wrong = trials.iter().filter(|trial| trial.judged.faults() > 0);
+        let warned: Vec<bool> = wrong.map(|trial| trial.judged.is_warned()).collect();
+        let over = |us: &dyn Fn(&Trial) -> f64| {
+            quantiles(trials.iter().map(|trial| us(trial) / trial.tikhonov_us), [0.5]).map(|[median]| median)
+        };
+        let next_us = |trial: &Trial| trial.next_us.iter().copied().fold(f64::INFINITY, f64::min);
         Some(Self {
+            over_tikhonov: [over(&|trial| trial.cold_us)?, over(&next_us)?],
+            warned: share(warned.into_iter()),
             scenes: trials.len(),
             count_right: share_of(&|trial| trial.judged.is_count_right())?,
             all_found: share_of(&|trial| trial.judged.faults() == 0)?,
@@ -174,11 +199,12 @@ fn share(all: impl ExactSizeIterator<Item = bool>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Scenes;
     use super::super::judge::Judged;
     use super::*;
     use crate::bound::Bound;
     use tactomo_physics::detector::Detector;
-    use tactomo_physics::scene::Contact;
+    use tactomo_physics::scene::{Contact, Touch};
     use tactomo_touch::solve::{FoundContact, Solution, Uncertainty};
 
     const CLEAR: Bound = Bound { position_m: 1e-4, conductance: 0.05, axes_m: [0.0; 2] };
@@ -200,8 +226,27 @@ mod tests {
         };
         let contacts = truth.iter().zip(off_mm).map(found).collect();
         let solution = Solution { contacts, ..Solution::default() };
-        let judged = Judged::new(&detector, &truth, Some(&vec![CLEAR; truth.len()]), &solution);
-        Trial { scene: 0, detector: detector.name, judged, cold_us: 1e3, next_us: vec![10.0, 30.0, 20.0] }
+        let touches: Vec<Touch> = truth.iter().copied().map(Touch::from).collect();
+        let judged = Judged::new(&detector, &touches, Some(&vec![CLEAR; truth.len()]), &solution);
+        Trial {
+            case: String::new(),
+            solver: "auto".to_owned(),
+            scene: 0,
+            kind: None,
+            detector: detector.name,
+            judged,
+            cold_us: 1e3,
+            next_us: vec![10.0, 30.0, 20.0],
+            tikhonov_us: 5.0,
+        }
+    }
+
+    fn case() -> Case {
+        Case::of("", Scenes::Random, vec![Detector::default()])
+    }
+
+    fn rows_of(trials: &[Trial]) -> Vec<Row> {
+        rows(&case(), "auto", &trials.iter().collect::<Vec<_>>())
     }
 
     fn row(rows: &[Row], class: &str) -> Row {
@@ -212,8 +257,9 @@ mod tests {
     fn scenes_are_counted_by_class() {
         let (light, firm) = ((2.5, 0.003), (1.5, 1.5));
         let trials = [trial(&[firm], &[0.1]), trial(&[firm, light], &[0.3]), trial(&[light, light], &[0.1, 0.1])];
-        let rows = rows(&trials);
-        let scenes = |class: &str| row(&rows, class).scenes.map(|figures| (figures.scenes, figures.all_found));
+        let rows = rows_of(&trials);
+        let find = |class: &str| rows.iter().find(|row| row.class == class);
+        let scenes = |class: &str| find(class)?.scenes.as_ref().map(|figures| (figures.scenes, figures.all_found));
         assert_eq!(scenes("1 contact"), Some((1, 1.0)));
         assert_eq!(scenes("2 contacts"), Some((2, 0.5)));
         assert_eq!(scenes("3 contacts"), None);
@@ -221,12 +267,18 @@ mod tests {
         assert_eq!(scenes("in corners"), None, "a class of contacts");
         let all = row(&rows, "all").scenes.unwrap();
         assert_eq!((all.cold_us.median, all.next_us), (1e3, Quantiles { median: 20.0, high: 30.0 }));
-        assert!((all.count_right - 2.0 / 3.0).abs() < 1e-12 && all.misfit == 0.0);
+        assert!((all.count_right - 2.0 / 3.0).abs() < 1e-12 && all.misfit == 0.0 && all.warned == Some(0.0));
+        assert_eq!(all.over_tikhonov, [200.0, 2.0]);
+        assert!(
+            !rows.iter().any(|row| row.class == "above 1 sheet" && row.contacts.visible == 0),
+            "nothing has no row"
+        );
     }
 
     #[test]
     fn contacts_are_counted_by_class() {
-        let rows = rows(&[trial(&[(1.5, 2.0), (2.5, 0.5), (4.0, 0.01)], &[0.1, 0.3]), trial(&[(1.5, 0.01)], &[0.5])]);
+        let rows =
+            rows_of(&[trial(&[(1.5, 2.0), (2.5, 0.5), (4.0, 0.01)], &[0.1, 0.3]), trial(&[(1.5, 0.01)], &[0.5])]);
         let small = row(&rows, "radius below 2 mm").contacts;
         assert_eq!((small.visible, small.found), (2, Some(1.0)));
         let error = small.error_m.unwrap();
@@ -246,16 +298,24 @@ mod tests {
             trial
         };
         let all = [of(&[0.1], Some(0.99)), of(&[], Some(0.97)), of(&[9.0], Some(0.5)), of(&[], None)];
-        let row = |least, scenes, claimed, right| Claims { least, scenes, claimed, right };
+        let (case_name, solver) = (String::new, || "auto".to_owned());
+        let row = |least, scenes, claimed, right| Claims {
+            case: case_name(),
+            solver: solver(),
+            least,
+            scenes,
+            claimed,
+            right,
+        };
         let expected =
             [row(Some(0.95), 2, Some(0.98), 0.5), row(Some(0.5), 1, Some(0.5), 1.0), row(None, 1, None, 0.0)];
-        assert_eq!(claims(&all), expected);
+        assert_eq!(claims(&case(), "auto", &all.iter().collect::<Vec<_>>()), expected);
     }
 
     #[test]
     fn coordinates_within_one_and_two_standard_errors_are_counted() {
         // Errors of x are 0.5, 1.5 and 2.5 standard errors, those of y none.
-        let rows = rows(&[trial(&[(2.0, 0.5); 3], &[0.1, 0.3, 0.5])]);
+        let rows = rows_of(&[trial(&[(2.0, 0.5); 3], &[0.1, 0.3, 0.5])]);
         let all = row(&rows, "all").contacts;
         assert_eq!(all.place_within, Some([4.0 / 6.0, 5.0 / 6.0]));
         assert_eq!(all.conductance_within, Some([1.0, 1.0]));

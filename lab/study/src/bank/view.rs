@@ -8,11 +8,11 @@ use tactomo_touch::solve::FoundContact;
 
 const MILLISECONDS: Format = Format { factor: 1e-3, ..Format::new("ms", "us").digits(1) };
 
-/// A row for each class, then the worst scenes.
+/// A row for each case and solver, or for each class where there is one case; then what is claimed, and the worst scenes.
 pub fn view(report: &Report) -> View {
-    let of_scenes = |value: fn(&SceneFigures) -> f64| {
-        move |row: &&Row| match &row.scenes {
-            Some(scenes) => Value::Number(value(scenes)),
+    let of_scenes = |value: fn(&SceneFigures) -> Option<f64>| {
+        move |row: &&Row| match row.scenes.as_ref().and_then(value) {
+            Some(value) => Value::Number(value),
             None => Value::Text(String::new()),
         }
     };
@@ -20,26 +20,29 @@ pub fn view(report: &Report) -> View {
     let high = |pair: Option<Quantiles>| pair.map(|pair| pair.high);
     let median = |pair: Option<Quantiles>| pair.map(|pair| pair.median);
     let (whole, two) = (PLAIN.digits(0), PLAIN.digits(2));
-    let rubbed = if report.rub > 0 { format!(" and calibrated with {} presses", report.rub) } else { String::new() };
     let title = format!(
-        "{} on {}; {} scenes, seed {}{}, judged at frame {}",
-        report.solver,
-        report.detectors.join(", "),
+        "{}: {} scenes of each case, seed {}, judged at frame {}",
+        report.solvers.join(", "),
         report.scenes,
         report.seed,
-        report.as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}{rubbed}")),
         report.frames
     );
-    let table = Table::of("", &report.rows)
+    let is_shown = |row: &&Row| report.cases.len() == 1 || row.class == "all";
+    let table = Table::of("", report.rows.iter().filter(is_shown))
+        .column("case", TEXT, |row| row.case.clone())
+        .column("solver", TEXT, |row| row.solver.clone())
         .column("", TEXT, |row| row.class)
-        .column("scenes", whole, of_scenes(|scenes| scenes.scenes as f64))
-        .column("count", PERCENT, of_scenes(|scenes| scenes.count_right))
-        .column("right", PERCENT, of_scenes(|scenes| scenes.all_found))
-        .column("misfit", PERCENT, of_scenes(|scenes| scenes.misfit))
-        .column("cold", MILLISECONDS, of_scenes(|scenes| scenes.cold_us.median))
-        .column("p95", MILLISECONDS, of_scenes(|scenes| scenes.cold_us.high))
-        .column("next", US.digits(0), of_scenes(|scenes| scenes.next_us.median))
-        .column("p95", US.digits(0), of_scenes(|scenes| scenes.next_us.high))
+        .column("scenes", whole, of_scenes(|scenes| Some(scenes.scenes as f64)))
+        .column("count", PERCENT, of_scenes(|scenes| Some(scenes.count_right)))
+        .column("right", PERCENT, of_scenes(|scenes| Some(scenes.all_found)))
+        .column("misfit", PERCENT, of_scenes(|scenes| Some(scenes.misfit)))
+        .column("warned", PERCENT, of_scenes(|scenes| scenes.warned))
+        .column("cold", MILLISECONDS, of_scenes(|scenes| Some(scenes.cold_us.median)))
+        .column("p95", MILLISECONDS, of_scenes(|scenes| Some(scenes.cold_us.high)))
+        .column("next", US.digits(0), of_scenes(|scenes| Some(scenes.next_us.median)))
+        .column("p95", US.digits(0), of_scenes(|scenes| Some(scenes.next_us.high)))
+        .column("over tikhonov", two, of_scenes(|scenes| Some(scenes.over_tikhonov[0])))
+        .column("next", two, of_scenes(|scenes| Some(scenes.over_tikhonov[1])))
         .column("visible", whole, |row| row.contacts.visible)
         .column("found", PERCENT, of(|contacts| contacts.found))
         .column("error", MM.digits(3), move |row| median(row.contacts.error_m))
@@ -51,11 +54,14 @@ pub fn view(report: &Report) -> View {
         .column("ln C, 1 s", PERCENT, of(|contacts| contacts.conductance_within.map(|[one, _]| one)))
         .column("2 s", PERCENT, of(|contacts| contacts.conductance_within.map(|[_, two]| two)))
         .note(
-            "count: as many found as are there; right: all visible found and none invented; cold, next: time of the first frame and of later ones; visible: \
-             the bound on ln C is below 0.2; xy, ln C: within 1 and 2 claimed standard errors",
+            "count: as many found as are there; right: all visible found and none invented, and of the kind that touches; warned: of those that are wrong, \
+             flagged or with the right number as alternative; cold, next: time of the first frame and of later ones, over tikhonov: in that solver's on the \
+             same frames; visible: the bound on ln C is below 0.2; xy, ln C: within 1 and 2 claimed standard errors",
         )
         .data();
     let claims = Table::of("What is claimed of the count", &report.claims)
+        .column("case", TEXT, |claims| claims.case.clone())
+        .column("solver", TEXT, |claims| claims.solver.clone())
         .column("claimed", TEXT, |claims| match claims.least {
             Some(least) => format!("{:.0} % or more", 100.0 * least),
             None => "nothing".to_owned(),
@@ -77,7 +83,9 @@ pub fn view(report: &Report) -> View {
 fn worst(trial: &Trial) -> Table {
     let judged = &trial.judged;
     let title = format!(
-        "scene {} on {}: {} there, {} visible, {} found, {} invented; residual {}{}",
+        "{}, {}, scene {} on {}: {} there, {} visible, {} found, {} invented; residual {}{}",
+        trial.solver,
+        trial.case,
         trial.scene,
         trial.detector,
         judged.truth.len(),
