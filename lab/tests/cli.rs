@@ -4,7 +4,7 @@ use tactomo_tests::LAB;
 
 #[test]
 fn every_command_has_a_help_with_an_example() {
-    for command in ["tradeoff", "stability", "study", "validate", "design", "learn", "score"] {
+    for command in ["tradeoff", "stability", "bank", "study", "validate", "design", "learn", "score"] {
         let output = LAB.run(&[command, "--help"]);
         let text = String::from_utf8_lossy(&output.stdout);
         assert_eq!(output.status.code(), Some(0));
@@ -15,7 +15,8 @@ fn every_command_has_a_help_with_an_example() {
 #[test]
 fn wrong_use_exits_with_2_and_names_the_argument() {
     for (args, named) in [
-        (&["study", "contacts", "--scenes", "0"][..], "--scenes"),
+        (&["bank", "--count", "0"][..], "--count"),
+        (&["bank", "--scenes", "rows"], "there are no scenes `rows`; there are random, single, corner, row"),
         (&["tradeoff", "--scan", "--solver", "auto"], "--solver"),
         (&["live", "--seconds", "-1"], "invalid value '-1' for '--seconds <SECONDS>': a time (s) from"),
         (&["design", "--smallest", "1e308"], "a force (N) from 0.000001 to 10000"),
@@ -41,6 +42,7 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         ),
         (&["stability", "--quick", "--csv", file], exists),
         (&["live", "--csv", file], exists),
+        (&["bank", "--case", "exakt"], "the bank has no case `exakt`; it has `exact`, `exact corners`"),
         (&["live", "--scene", "single", "--scan", "99"], "--scan 99, scene single: there is no electrode 99"),
     ] {
         let message = LAB.refused(args);
@@ -49,24 +51,18 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
 }
 
 #[test]
-fn the_study_of_contacts_has_a_row_for_each_class_and_shows_the_worst_scene() {
-    let args = ["study", "contacts", "--detector", "square-60", "--scenes", "5", "--worst", "1"];
+fn a_case_that_is_asked_for_has_a_row_for_each_class_and_shows_the_worst_scene() {
+    let args = ["bank", "--scenes", "random", "--detector", "square-60", "--count", "5", "--worst", "1"];
     let output = LAB.run(&args);
     let text = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{text}");
-    for class in [
-        "1 contact ",
-        "5 contacts ",
-        "all ",
-        "contrast above 100",
-        "in corners",
-        "radius above 3.5 mm",
-        "above 1 sheet",
-    ] {
-        assert_eq!(text.lines().filter(|line| line.starts_with(class)).count(), 1, "{class}: {text}");
+    for class in ["1 contact ", "5 contacts ", "all "] {
+        let is_row = |line: &&str| line.starts_with("random") && line.contains(&format!(" {class}"));
+        assert_eq!(text.lines().filter(is_row).count(), 1, "{class}: {text}");
     }
-    assert!(text.contains("on square-60: ") && text.contains(" visible, "), "{text}");
+    assert!(text.contains("auto, random, scene ") && text.contains(" visible, "), "{text}");
     let report = LAB.json(&[&args[..], &["--json"]].concat());
-    assert_eq!((&report["rows"][5]["class"], &report["rows"][5]["scenes"]["scenes"]), (&"all".into(), &5.into()));
+    let all = report["rows"].as_array().and_then(|rows| rows.iter().find(|row| row["class"] == "all")).unwrap();
+    assert_eq!((&all["case"], &all["solver"], &all["scenes"]["scenes"]), (&"random".into(), &"auto".into(), &5.into()));
     assert_eq!(report["worst"].as_array().map(Vec::len), Some(1));
 }
