@@ -124,3 +124,21 @@ impl Case {
         built.known_as(&detector)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bank_has_each_case_once_and_its_detectors_as_built_can_be_drawn() {
+        let bank = Case::bank(1000, 3);
+        for (index, case) in bank.iter().enumerate() {
+            assert!(bank[..index].iter().all(|other| other.name != case.name), "{}", case.name);
+            let builds = if case.name.starts_with("built") { 3 } else { 0 };
+            assert_eq!((case.built.len(), case.detectors.len(), case.described().len()), (builds, 1, builds.max(1)));
+            for seed in &case.built {
+                assert!(try_drawn(&case.detectors[0], *seed).is_ok(), "{}, {seed}", case.name);
+            }
+        }
+    }
+}

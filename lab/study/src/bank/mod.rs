@@ -256,14 +256,11 @@ mod tests {
     /// A part of the bank: every case has a figure for every solver that is tried, on the same readings.
     #[test]
     fn solvers_stand_side_by_side_in_every_case() {
-        let plan = Plan {
-            cases: Case::bank(1, 2),
-            methods: vec![Method::Core, Method::Tikhonov],
-            scenes: 7,
-            threads: 2,
-            worst: 0,
-            ..plan(2)
-        };
+        let parts = ["exact", "built, top over bottom", "built, near", "built, shapes"];
+        let cases = Case::bank(1, 1).into_iter().filter(|case| parts.contains(&&*case.name)).collect();
+        let methods = vec![Method::Core, Method::Tikhonov];
+        let plan = Plan { cases, methods, scenes: 7, worst: 0, ..plan(2) };
+        assert_eq!(plan.cases.len(), parts.len());
         let report = run(&plan, "", &mut |_| ()).unwrap();
         for case in &plan.cases {
             let all: Vec<_> = report.rows.iter().filter(|row| row.case == case.name && row.class == "all").collect();
@@ -277,7 +274,7 @@ mod tests {
         }
         let exact =
             report.rows.iter().find(|row| row.case == "exact" && row.solver == "core" && row.class == "1 contact");
-        assert!(exact.and_then(|row| row.contacts.error_m).is_some_and(|error| error.median < 3e-4), "{exact:?}");
+        assert!(exact.and_then(|row| row.contacts.over_bound).is_some_and(|over| over.median < 3.0), "{exact:?}");
         let text = crate::view::text(&[view(&report)]);
         assert!(plan.cases.iter().all(|case| text.contains(&case.name)) && !text.contains("NaN"), "{text}");
     }
