@@ -151,66 +151,43 @@ fn the_largest_frames_of_rows_fit() {
 }
 
 #[test]
-fn the_last_range_is_stretched_over_the_electrodes_that_are_left() {
-    let outside = Outside::default();
-    let ranges = [(6, 142, 3000), (4, 128, 2000)].map(|(electrodes, floor, ceiling)| Range {
-        floor,
-        ceiling,
-        ..Range::of_codes(electrodes, 12)
-    });
-    let identity = Identity { adc: Adc::new(12, 4096).with_ranges(&ranges), ..IDENTITY };
-    let sample = |_, electrode: u8| Ok(if electrode == 15 { 2500 } else { 0 });
-    let parts = Parts {
-        mux: NoMux,
-        sampler: sampler(&outside, sample),
-        serial: serial(&outside),
-        chip: NullPart,
-        touch: NoTouch,
-    };
-    let mut board = Board16::new(parts, identity).unwrap();
-    outside.send(Command::Start);
-    while board.step().unwrap() != Activity::Frame {}
-    board.step().unwrap();
-    let messages = outside.messages();
-    let told: Vec<_> = hellos(&messages)[0].ranges.iter().map(|range| (range.electrodes, range.floor)).collect();
-    assert_eq!(told, [(6, 142), (10, 128)]);
-    assert_eq!(frames(&messages)[0].head.status, Status::SATURATED, "the last electrode has the last one's ceiling");
-}
-
-#[test]
-fn every_electrode_saturates_where_its_own_converter_does() {
-    let outside = Outside::default();
-    let ranges = [(6, 142, 3000), (99, 128, 2000)].map(|(electrodes, floor, ceiling)| Range {
-        floor,
-        ceiling,
-        ..Range::of_codes(electrodes, 12)
-    });
-    let identity = Identity { adc: Adc::new(12, 4096).with_ranges(&ranges), ..IDENTITY };
-    let sample = |number: u64, electrode: u8| {
-        Ok(match (number / 256, electrode) {
-            (0, 5) => 2999,
-            (0, _) => 1999,
-            (1, 5) | (2, 6) => 2500,
-            _ => 0,
-        })
-    };
-    let parts = Parts {
-        mux: NoMux,
-        sampler: sampler(&outside, sample),
-        serial: serial(&outside),
-        chip: NullPart,
-        touch: NoTouch,
-    };
-    let mut board = Board16::new(parts, identity).unwrap();
-    outside.send(Command::Start);
-    let mut scanned = 0;
-    while scanned < 4 {
-        scanned += u32::from(board.step().unwrap() == Activity::Frame);
+fn every_electrode_saturates_where_its_own_converter_does_and_the_last_range_has_those_that_are_left() {
+    // The last range is told of too few electrodes, and of too many.
+    for (electrodes, of_the_last) in [(4, 15), (99, 6)] {
+        let outside = Outside::default();
+        let ranges = [(6, 142, 3000), (electrodes, 128, 2000)].map(|(electrodes, floor, ceiling)| Range {
+            floor,
+            ceiling,
+            ..Range::of_codes(electrodes, 12)
+        });
+        let identity = Identity { adc: Adc::new(12, 4096).with_ranges(&ranges), ..IDENTITY };
+        let sample = |number: u64, electrode: u8| {
+            Ok(match (number / 256, electrode) {
+                (0, 5) => 2999,
+                (0, _) => 1999,
+                (1, 5) => 2500,
+                (2, electrode) if electrode == of_the_last => 2500,
+                _ => 0,
+            })
+        };
+        let parts = Parts {
+            mux: NoMux,
+            sampler: sampler(&outside, sample),
+            serial: serial(&outside),
+            chip: NullPart,
+            touch: NoTouch,
+        };
+        let mut board = Board16::new(parts, identity).unwrap();
+        outside.send(Command::Start);
+        let mut scanned = 0;
+        while scanned < 4 {
+            scanned += u32::from(board.step().unwrap() == Activity::Frame);
+        }
+        board.step().unwrap();
+        let messages = outside.messages();
+        let status: Vec<_> = frames(&messages).iter().map(|frame| frame.head.status).collect();
+        assert_eq!(status[..3], [Status::default(), Status::default(), Status::SATURATED]);
+        let told: Vec<_> = hellos(&messages)[0].ranges.iter().map(|range| (range.electrodes, range.floor)).collect();
+        assert_eq!(told, [(6, 142), (10, 128)]);
     }
-    board.step().unwrap();
-    let messages = outside.messages();
-    let status: Vec<_> = frames(&messages).iter().map(|frame| frame.head.status).collect();
-    assert_eq!(status[..3], [Status::default(), Status::default(), Status::SATURATED]);
-    let told: Vec<_> = hellos(&messages)[0].ranges.iter().map(|range| (range.electrodes, range.floor)).collect();
-    assert_eq!(told, [(6, 142), (10, 128)], "the last range ends with the electrodes");
 }
