@@ -326,6 +326,8 @@ mod tests {
     #[test]
     fn floors_are_those_of_each_electrodes_converter() {
         let (converters, inputs) = BoardModel::Esp32.converters();
+        let known = converters.iter().map(|of| (of.gain_share, of.bow_v));
+        assert!(known.eq([(0.01, 0.012); 2]), "{converters:?}");
         let floor_v = |input: usize| converters[inputs[input]].range_v[0];
         assert_eq!((inputs.len(), floor_v(0), floor_v(5), floor_v(6)), (16, 0.142, 0.142, 0.128));
         let (ideal, c3) = (BoardModel::Ideal.converters(), BoardModel::Esp32c3.converters());
