@@ -2,6 +2,7 @@
 
 mod cases;
 mod judge;
+mod places;
 mod rows;
 mod scenes;
 mod view;

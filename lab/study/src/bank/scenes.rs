@@ -1,13 +1,13 @@
 //! What touches in the scenes of a bank.
 
-use std::f64::consts::TAU;
 use std::ops::Range;
 use std::str::FromStr;
 
+use super::places::{Places, SHAPES};
 use crate::scenes::electrode_distance_m;
 use tactomo_physics::detector::{Detector, Outline};
 use tactomo_physics::geometry::{self, Point};
-use tactomo_physics::scene::{Contact, Hand, Scene, SceneName, Shape, Touch};
+use tactomo_physics::scene::{Contact, Touch};
 
 /// Most contacts of a scene.
 pub(super) const MAX_CONTACTS: usize = 5;
@@ -22,31 +22,7 @@ const MARGIN_M: f64 = 1e-3;
 /// Conductances (S): from some noise of the converter to where more would change little.
 const CONDUCTANCES_S: Range<f64> = 1e-5..1e-1;
 /// Places tried for a contact before all are placed anew.
-const TRIES: usize = 1000;
-/// Fingertips: radii (m), conductances (sheet conductances), and how far their centres are from walls at least (m).
-const FINGER_RADII_M: Range<f64> = 2e-3..3e-3;
-const FINGER_SHEETS: Range<f64> = 0.03..3.0;
-const FINGER_MARGIN_M: f64 = 6e-3;
-/// Fingers in a row are so far apart (m): those of a hand that are held together are not nearer.
-const IN_A_ROW_M: f64 = 12e-3;
-/// Two fingers that are pinched (m).
-const NEAR_M: Range<f64> = 5e-3..9e-3;
-/// Two discs that an edge may be taken for, or the other way round (m).
-const PAIR_M: Range<f64> = 10e-3..15e-3;
-/// In corners: as far from both walls (m), and conductances (sheet conductances), beside nothing or a firm contact.
-const CORNER_M: Range<f64> = 3e-3..6e-3;
-const CORNER_SHEETS: Range<f64> = 0.05..0.5;
-const FIRM_SHEETS: f64 = 2.0;
-const BESIDE_M: Range<f64> = 10e-3..20e-3;
-/// A hand is read at some moment of so many seconds, in which each finger presses most once.
-const HAND_S: f64 = 5.0;
-/// Shapes: longest extent (m), width of strips (m), conductances (sheet conductances).
-const EXTENT_M: Range<f64> = 16e-3..24e-3;
-const STRIP_M: f64 = 4e-3;
-const SHAPE_SHEETS: Range<f64> = 0.3..3.0;
-/// A wide disc's radius (m).
-const WIDE_M: f64 = 6e-3;
-
+pub(super) const TRIES: usize = 1000;
 /// What touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -95,16 +71,13 @@ impl Scenes {
 
     /// What touches in the scene of this number.
     fn touches(self, detector: &Detector, index: usize, random: &mut fastrand::Rng) -> Vec<Touch> {
-        let mut places = Places { detector, scale: scale(detector), random };
+        let mut places = Places::new(detector, random);
         let discs = match self {
             Self::Random => contacts(detector, 1 + index % MAX_CONTACTS, places.random),
             Self::Single => places.row(1, 0.0),
             Self::Corner => places.in_corner(index % 2 == 1),
-            Self::Row => places.row(3 + index % 3, places.scale * IN_A_ROW_M),
-            Self::Near => {
-                let apart_m = places.length_m(NEAR_M);
-                places.row(2, apart_m)
-            }
+            Self::Row => places.in_a_row(3 + index % 3),
+            Self::Near => places.near(),
             Self::Hand => return places.hand(),
             Self::Shape => return places.shape(index % SHAPES.len()),
         };
@@ -139,9 +112,6 @@ impl FromStr for Scenes {
     }
 }
 
-/// Kinds of [`Scenes::Shape`].
-const SHAPES: [&str; 7] = ["two discs", "wide disc", "line", "ring", "cross", "triangle", "L"];
-
 /// A scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TriedScene {
@@ -155,120 +125,6 @@ pub(super) struct TriedScene {
     pub touches: Vec<Touch>,
     /// Seed of the noise.
     pub noise_seed: u64,
-}
-
-/// Where fingers and shapes are; lengths are in proportion to the detector's.
-struct Places<'a> {
-    detector: &'a Detector,
-    scale: f64,
-    random: &'a mut fastrand::Rng,
-}
-
-impl Places<'_> {
-    fn conductance_s(&mut self, sheets: Range<f64>) -> f64 {
-        log_uniform(sheets, self.random) * self.detector.sheet_conductance_s()
-    }
-
-    fn length_m(&mut self, range_m: Range<f64>) -> f64 {
-        self.scale * (range_m.start + (range_m.end - range_m.start) * self.random.f64())
-    }
-
-    /// A place and a direction at which points (m) about it, turned that way, are far enough from walls.
-    fn place(&mut self, about_m: &[Point]) -> Option<(Point, Point)> {
-        let (outline, least_m) = (&self.detector.outline, self.scale * FINGER_MARGIN_M);
-        let size_m = outline.size_m();
-        (0..TRIES).find_map(|_| {
-            let at_m = size_m.map(|side_m| side_m * (self.random.f64() - 0.5));
-            let (sin, cos) = (TAU * self.random.f64()).sin_cos();
-            let is_free = |by_m: &Point| margin_m(outline, moved(at_m, turned(*by_m, [cos, sin]))) >= least_m;
-            about_m.iter().all(is_free).then_some((at_m, [cos, sin]))
-        })
-    }
-
-    fn fingertip(&mut self, [x_m, y_m]: Point) -> Contact {
-        Contact::flat(x_m, y_m, self.length_m(FINGER_RADII_M), self.conductance_s(FINGER_SHEETS))
-    }
-
-    /// So many fingertips in a row, this far apart (m); fewer where the detector has no room.
-    fn row(&mut self, count: usize, apart_m: f64) -> Vec<Contact> {
-        let along = |count: usize| -> Vec<Point> {
-            (0..count).map(|i| [apart_m * (i as f64 - 0.5 * (count as f64 - 1.0)), 0.0]).collect()
-        };
-        let placed = (1..=count).rev().find_map(|count| self.place(&along(count)).map(|placed| (count, placed)));
-        let (count, (at_m, direction)) = placed.unwrap_or((1, ([0.0; 2], [1.0, 0.0])));
-        along(count).into_iter().map(|by_m| self.fingertip(moved(at_m, turned(by_m, direction)))).collect()
-    }
-
-    /// A light contact in a corner, alone or beside a firm one.
-    fn in_corner(&mut self, is_beside: bool) -> Vec<Contact> {
-        let from_walls_m = self.length_m(CORNER_M);
-        let half_m = self.detector.outline.size_m().map(|side_m| 0.5 * side_m - from_walls_m);
-        let [x_m, y_m] = half_m.map(|side_m| if self.random.bool() { side_m } else { -side_m });
-        let light = Contact::flat(x_m, y_m, self.length_m(FINGER_RADII_M), self.conductance_s(CORNER_SHEETS));
-        let (far_m, firm_s) = (self.length_m(BESIDE_M), FIRM_SHEETS * self.detector.sheet_conductance_s());
-        // Towards the middle along one wall or the other.
-        let [x_m, y_m] =
-            if self.random.bool() { [x_m - far_m.copysign(x_m), y_m] } else { [x_m, y_m - far_m.copysign(y_m)] };
-        let firm = Contact::flat(x_m, y_m, self.length_m(FINGER_RADII_M), firm_s);
-        std::iter::once(light).chain(is_beside.then_some(firm)).collect()
-    }
-
-    /// The fingers of a hand at some moment.
-    fn hand(&mut self) -> Vec<Touch> {
-        let (seed, time_s) = (self.random.u64(..), HAND_S * self.random.f64());
-        Scene::new(SceneName::FiveFingers, self.detector, Hand::relative(self.detector), seed).at(time_s)
-    }
-
-    /// A touch of a kind of [`SHAPES`].
-    fn shape(&mut self, kind: usize) -> Vec<Touch> {
-        let (extent_m, width_m) = (self.length_m(EXTENT_M), self.scale * STRIP_M);
-        let (half_m, strip_m) = (0.5 * extent_m, 0.5 * width_m);
-        let square_m = [[half_m, half_m], [-half_m, half_m], [-half_m, -half_m], [half_m, -half_m]];
-        let (centre_m, direction) = self.place(&square_m).unwrap_or(([0.0; 2], [1.0, 0.0]));
-        let polygon = |corners_m: &[Point]| Shape::Polygon {
-            corners_m: corners_m.iter().map(|corner_m| turned(*corner_m, direction)).collect(),
-        };
-        let shape = match SHAPES[kind] {
-            "two discs" => {
-                let apart_m = self.length_m(PAIR_M);
-                return self.row(2, apart_m).into_iter().map(Touch::from).collect();
-            }
-            "wide disc" => Shape::Disc { radius_m: self.scale * WIDE_M },
-            "line" => Shape::Line { length_m: extent_m, width_m, angle_rad: direction[1].atan2(direction[0]) },
-            "ring" => Shape::Ring { radius_m: half_m - strip_m, width_m },
-            "cross" => {
-                let (h, w) = (half_m, strip_m);
-                polygon(&[
-                    [h, -w],
-                    [h, w],
-                    [w, w],
-                    [w, h],
-                    [-w, h],
-                    [-w, w],
-                    [-h, w],
-                    [-h, -w],
-                    [-w, -w],
-                    [-w, -h],
-                    [w, -h],
-                    [w, -w],
-                ])
-            }
-            "triangle" => polygon(&[[half_m, -half_m], [0.0, half_m], [-half_m, -half_m]]),
-            _ => {
-                let (h, w) = (half_m, half_m - width_m);
-                polygon(&[[-h, -h], [h, -h], [h, -w], [-w, -w], [-w, h], [-h, h]])
-            }
-        };
-        vec![Touch::flat(centre_m, shape, self.conductance_s(SHAPE_SHEETS))]
-    }
-}
-
-fn moved(at_m: Point, by_m: Point) -> Point {
-    [0, 1].map(|axis| at_m[axis] + by_m[axis])
-}
-
-fn turned([x, y]: Point, [cos, sin]: Point) -> Point {
-    [cos * x - sin * y, sin * x + cos * y]
 }
 
 /// Ratio of a detector's lengths to those of 15 mm between electrodes.
@@ -308,7 +164,7 @@ fn placed(outline: &Outline, sizes: &[Contact], scale: f64, random: &mut fastran
 }
 
 /// Distance of a place from the outline (m); below zero where it is beside the detector.
-fn margin_m(outline: &Outline, place_m: Point) -> f64 {
+pub(super) fn margin_m(outline: &Outline, place_m: Point) -> f64 {
     let rings = || std::iter::once(&outline.outer).chain(&outline.holes);
     let edges = rings().flat_map(|ring| geometry::edges(ring));
     let distance_m = edges.map(|edge| geometry::segment_distance(place_m, edge)).fold(f64::INFINITY, f64::min);
@@ -317,7 +173,7 @@ fn margin_m(outline: &Outline, place_m: Point) -> f64 {
     if is_on { distance_m } else { -distance_m }
 }
 
-fn log_uniform(range: Range<f64>, random: &mut fastrand::Rng) -> f64 {
+pub(super) fn log_uniform(range: Range<f64>, random: &mut fastrand::Rng) -> f64 {
     range.start * (range.end / range.start).powf(random.f64())
 }
 
