@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME", conflicts_with = "scenes")]
     case: Vec<String>,
     /// How many detectors as built a case of the bank has, drawn with this seed and those after it
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, default_value_t = 4, conflicts_with = "scenes", value_parser = clap::value_parser!(u64).range(1..=1000))]
     builds: u64,
     /// What touches, in place of the cases of the bank: random, single, corner, row, near, hand, or shape
     #[arg(long, value_name = "KIND")]

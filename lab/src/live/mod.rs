@@ -19,7 +19,7 @@ use tactomo_board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo_board::source::{Opened, Recording, Source};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::{Hand, Scene, SceneName};
-use tactomo_physics::simulate::{Simulation, drawn_top_over_bottom, try_drawn};
+use tactomo_physics::simulate::{Simulation, drawn_top_over_bottom};
 use tactomo_touch::solve::{Method, Problem};
 
 pub use self::score::{Answer, Scored, Scorer};
@@ -129,10 +129,7 @@ fn run(case: &Case) -> anyhow::Result<Found> {
     let detector = model.described(detector, case.built.is_some());
     let scene = Scene::new(case.scene, &detector, Hand::relative(&detector), case.seed);
     let truth = match case.built {
-        Some(seed) => match case.top_over_bottom {
-            Some(deviations) => drawn_top_over_bottom(&detector, seed, deviations)?,
-            None => try_drawn(&detector, seed)?,
-        },
+        Some(seed) => drawn_top_over_bottom(&detector, seed, case.top_over_bottom)?,
         None => detector.clone(),
     };
     let simulation = Simulation::new(&truth, scene.clone(), &[], case.seed)?;

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use super::scenes::electrode_distance_m;
 use tactomo_physics::baseline::{Baseline, BaselinePatterns, BaselineSum, Leakage};
-use tactomo_physics::detector::{Adc, Detector, Electrode, Problem as Wrong, Tolerances};
+use tactomo_physics::detector::{Adc, Detector, Electrode, Tolerances};
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
 use tactomo_physics::readings::{Range, Readings};
@@ -43,16 +43,6 @@ pub enum StudyError {
     OfTime {
         /// The fault.
         fault: String,
-    },
-    /// Tolerances so wide that what was drawn is no detector.
-    #[error("{detector} as built with seed {seed}: {wrong}; its tolerances are too wide, or another seed is needed")]
-    AsBuilt {
-        /// Its name.
-        detector: String,
-        /// The seed.
-        seed: u64,
-        /// What is wrong with what was drawn.
-        wrong: Wrong,
     },
     /// What was built cannot be drawn.
     #[error(transparent)]
@@ -168,8 +158,8 @@ impl Experiment {
     /// As for [`as_built`](Self::as_built).
     pub fn as_built_within(&self, tolerances: Tolerances, seed: u64) -> Result<Self, StudyError> {
         let built = drawn(&Detector { tolerances, ..self.detector.clone() }, seed);
-        let name = || self.detector.name.clone();
-        built.check().map_err(|wrong| StudyError::AsBuilt { detector: name(), seed, wrong })?;
+        let wrong = |source| CannotDraw::Wrong { detector: self.detector.name.clone(), seed, source };
+        built.check().map_err(wrong)?;
         self.made_as(&built)
     }
 

@@ -89,11 +89,13 @@ pub fn try_drawn(detector: &Detector, seed: u64) -> Result<Detector, CannotDraw>
     }
 }
 
-/// The detector that [`try_drawn`] gives, but its top conducts better than its bottom by so many standard deviations of that tolerance.
+/// The detector that [`try_drawn`] gives; if so many standard deviations of that tolerance are given, its top conducts better than its bottom by these
+/// in place of what is drawn.
 ///
 /// # Errors
 /// As for [`try_drawn`].
-pub fn drawn_top_over_bottom(detector: &Detector, seed: u64, deviations: f64) -> Result<Detector, CannotDraw> {
+pub fn drawn_top_over_bottom(detector: &Detector, seed: u64, deviations: Option<f64>) -> Result<Detector, CannotDraw> {
+    let Some(deviations) = deviations else { return try_drawn(detector, seed) };
     let tolerances = Tolerances { top_over_bottom_factor: 1.0, ..detector.tolerances };
     let built = try_drawn(&Detector { tolerances, ..detector.clone() }, seed)?;
     let step = deviations * detector.tolerances.top_over_bottom_factor.ln();
@@ -174,7 +176,7 @@ mod tests {
         let usual = try_drawn(&described, 9).unwrap();
         let factor = described.tolerances.top_over_bottom_factor;
         for deviations in [-2.0, 0.0, 3.0] {
-            let built = drawn_top_over_bottom(&described, 9, deviations).unwrap();
+            let built = drawn_top_over_bottom(&described, 9, Some(deviations)).unwrap();
             assert!((ratio(&built) / ratio(&described) / factor.powf(deviations) - 1.0).abs() < 1e-9);
             assert!((built.sheet_conductance_s() / usual.sheet_conductance_s() - 1.0).abs() < 1e-9);
             assert_eq!((&built.electrodes, &built.unevenness), (&usual.electrodes, &usual.unevenness));

@@ -7,7 +7,7 @@ use crate::calibrate::{Calibrate, Calibrated};
 use crate::experiment::{Experiment, StudyError};
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Detector, FOAMS, Layer};
-use tactomo_physics::simulate::{drawn_top_over_bottom, try_drawn};
+use tactomo_physics::simulate::drawn_top_over_bottom;
 
 /// How much better the graded detector conducts at the bottom than at the top: as much as the paper's samples differ, and more.
 const GRADING: f64 = 10.0;
@@ -97,10 +97,7 @@ impl Case {
         for detector in &self.detectors {
             let sound = Experiment::new(detector)?;
             for built in &self.built {
-                let truth = match self.top_over_bottom {
-                    Some(deviations) => drawn_top_over_bottom(detector, *built, deviations)?,
-                    None => try_drawn(detector, *built)?,
-                };
+                let truth = drawn_top_over_bottom(detector, *built, self.top_over_bottom)?;
                 all.push(self.calibrated(sound.made_as(&truth)?, seed, progress)?);
             }
             if self.built.is_empty() {
@@ -137,7 +134,11 @@ mod tests {
             let builds = if case.name.starts_with("built") { 3 } else { 0 };
             assert_eq!((case.built.len(), case.detectors.len(), case.described().len()), (builds, 1, builds.max(1)));
             for seed in &case.built {
-                assert!(try_drawn(&case.detectors[0], *seed).is_ok(), "{}, {seed}", case.name);
+                assert!(
+                    drawn_top_over_bottom(&case.detectors[0], *seed, case.top_over_bottom).is_ok(),
+                    "{}, {seed}",
+                    case.name
+                );
             }
         }
     }

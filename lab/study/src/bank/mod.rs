@@ -96,7 +96,7 @@ pub struct Trial {
     pub cold_us: f64,
     /// Times of the next frames (us).
     pub next_us: Vec<f64>,
-    /// Median time of `tikhonov` on the same frames, between those of the solver (us).
+    /// Median time of `tikhonov` on the same frames, which it reads right after the solver (us).
     pub tikhonov_us: f64,
 }
 

@@ -146,12 +146,11 @@ impl SceneFigures {
         let share_of = |is: &dyn Fn(&Trial) -> bool| share(trials.iter().map(|trial| is(trial)));
         let wrong = trials.iter().filter(|trial| trial.judged.faults() > 0);
         let warned: Vec<bool> = wrong.map(|trial| trial.judged.is_warned()).collect();
-        let over = |us: &dyn Fn(&Trial) -> f64| {
-            quantiles(trials.iter().map(|trial| us(trial) / trial.tikhonov_us), [0.5]).map(|[median]| median)
-        };
-        let next_us = |trial: &Trial| trial.next_us.iter().copied().fold(f64::INFINITY, f64::min);
+        let median = |all: &mut dyn Iterator<Item = f64>| quantiles(all, [0.5]).map(|[median]| median);
+        let cold = &mut trials.iter().map(|trial| trial.cold_us / trial.tikhonov_us);
+        let next = &mut trials.iter().flat_map(|trial| trial.next_us.iter().map(|us| us / trial.tikhonov_us));
         Some(Self {
-            over_tikhonov: [over(&|trial| trial.cold_us)?, over(&next_us)?],
+            over_tikhonov: [median(cold)?, median(next)?],
             warned: share(warned.into_iter()),
             scenes: trials.len(),
             count_right: share_of(&|trial| trial.judged.is_count_right())?,
@@ -268,7 +267,7 @@ mod tests {
         let all = row(&rows, "all").scenes.unwrap();
         assert_eq!((all.cold_us.median, all.next_us), (1e3, Quantiles { median: 20.0, high: 30.0 }));
         assert!((all.count_right - 2.0 / 3.0).abs() < 1e-12 && all.misfit == 0.0 && all.warned == Some(0.0));
-        assert_eq!(all.over_tikhonov, [200.0, 2.0]);
+        assert_eq!(all.over_tikhonov, [200.0, 4.0]);
         assert!(
             !rows.iter().any(|row| row.class == "above 1 sheet" && row.contacts.visible == 0),
             "nothing has no row"

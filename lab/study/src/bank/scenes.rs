@@ -23,6 +23,7 @@ const MARGIN_M: f64 = 1e-3;
 const CONDUCTANCES_S: Range<f64> = 1e-5..1e-1;
 /// Places tried for a contact before all are placed anew.
 pub(super) const TRIES: usize = 1000;
+
 /// What touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::scenes::SceneKind;
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::forward::readings_v;
 use tactomo_touch::solve::Method;
 
@@ -107,8 +108,9 @@ fn what_was_drawn_is_measured_and_solvers_know_the_description_only() {
     assert_eq!(known.problem.detector(), built.truth());
     let mut wide = Detector { name: "wide".to_owned(), ..experiment.detector };
     wide.tolerances.gain_share = 1.0;
-    let error = Experiment::of(&wide, Some(1)).err().unwrap().to_string();
-    assert!(error.starts_with("wide as built with seed 1: electrodes.gains["), "{error}");
+    let error = with_causes(&Experiment::of(&wide, Some(1)).err().unwrap());
+    assert!(error.starts_with("wide as built with seed 1 is no detector: narrow"), "{error}");
+    assert!(error.contains("electrodes.gains["), "{error}");
 }
 
 /// Readings of one contact, foretold by who knows what was built, and not by who knows the description.
