@@ -5,6 +5,7 @@
 
 mod auto;
 mod contact;
+mod disc_fields;
 mod driving;
 pub mod jacobian;
 mod jacobian_file;
@@ -24,6 +25,7 @@ use nalgebra::DMatrix;
 
 pub use self::auto::Auto;
 pub use self::contact::ContactFields;
+pub use self::disc_fields::DiscFields;
 pub use self::driving::{ConnectingPoints, DrivingLayer, sheet_drops_ohm};
 pub use self::jacobian_file::JacobianFileError;
 pub use self::joined::{Joint, JointCurrents};
@@ -34,6 +36,7 @@ use self::spots::SpotFields;
 pub use self::spread::touched_impedance_ohm;
 pub use self::through::Through;
 use crate::detector::Detector;
+use crate::geometry::Point;
 use crate::readings::Readings;
 use crate::scene::Contact;
 use crate::space;
@@ -132,6 +135,14 @@ pub trait ForwardModel: Send + Sync {
     /// # Errors
     /// [`ForwardError::Detector`] if there is no such model of the detector.
     fn of_similar(&self, detector: &Detector) -> Result<Arc<dyn ForwardModel>, ForwardError>;
+
+    /// Fields of an even current over a disc at a place (m), of a radius (m): over the part of it that is on the detector.
+    ///
+    /// # Errors
+    /// [`ForwardError::Contact`] if it is not on the detector.
+    fn disc_fields(&self, place_m: Point, radius_m: f64) -> Result<DiscFields, ForwardError> {
+        DiscFields::of_light(self, place_m, radius_m)
+    }
 
     /// Fields of spots that stand for contacts of a radius (m); none if the model has no such thing.
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>>;

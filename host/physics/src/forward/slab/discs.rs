@@ -6,7 +6,8 @@ use super::cut::CutDisc;
 use super::disc::DiscBasis;
 use super::pads::between;
 use super::{Slab, from_corner};
-use crate::forward::ForwardError;
+use crate::forward::{DiscFields, ForwardError};
+use crate::geometry::Point;
 use crate::forward::contact::{ContactSystem, Contacted};
 use crate::forward::uneven_place::UnevenPlace;
 use crate::scene::Contact;
@@ -125,6 +126,18 @@ impl Slab {
             points.extend(nodes.into_iter().zip(currents.row_iter().map(|row| row.iter().copied().collect())));
         }
         Ok((at.contacted.impedance_ohm, points))
+    }
+
+    /// Fields of an even current over a disc.
+    pub(super) fn fields_of_disc(&self, [x_m, y_m]: Point, radius_m: f64) -> Result<DiscFields, ForwardError> {
+        let contact = Contact::flat(x_m, y_m, radius_m, 1.0);
+        self.check_contact(&contact).map_err(|what| ForwardError::Contact { index: 0, what })?;
+        let disc = self.disc(&contact, DiscBasis::of_degree(self.contact_degree(radius_m)));
+        let even = disc.uneven.as_ref().map_or(1.0, |uneven| uneven.inverse_root.powi(2));
+        let own_ohm = even * self.top.even_disc_ohm(disc.own_radius_m) + self.between(&disc, &disc)[(0, 0)];
+        let electrodes_ohm = disc.electrodes_ohm.row(0).iter().copied().collect();
+        // The conductance given is one.
+        Ok(DiscFields::centred(electrodes_ohm, own_ohm, disc.conductance_s))
     }
 
     fn disc(&self, contact: &Contact, basis: &'static DiscBasis) -> Disc {

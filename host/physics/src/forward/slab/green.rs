@@ -10,7 +10,7 @@ use std::sync::{LazyLock, OnceLock};
 
 use nalgebra::{DMatrix, DVector, DVectorView};
 
-use super::disc::DiscSelf;
+use super::disc::{DiscSelf, even_ohm};
 use super::quadrature::panels;
 use super::spline::{Grid, signs};
 
@@ -157,6 +157,11 @@ impl SurfaceGreen {
     /// Self-impedance of a disc on this surface, without the smooth part.
     pub fn disc_self(&self, radius_m: f64) -> DiscSelf {
         DiscSelf::new(radius_m, self.spectrum.sigma, |ln_k| self.spectrum.at(ln_k))
+    }
+
+    /// Self-impedance of an even current over a disc (ohm), without the smooth part.
+    pub fn even_disc_ohm(&self, radius_m: f64) -> f64 {
+        even_ohm(radius_m, self.spectrum.sigma, |ln_k| self.spectrum.at(ln_k))
     }
 
     /// Mirror images that bring a disc at `b` within reach of a disc at `a`; `gap_m` is added to the reach.

@@ -44,8 +44,9 @@ use self::uneven::Uneven;
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::driving::DrivingLayer;
 use super::spots::SpotFields;
-use super::{ForwardError, ForwardModel, ImageMesh, check_image, leaks};
+use super::{DiscFields, ForwardError, ForwardModel, ImageMesh, check_image, leaks};
 use crate::detector::Detector;
+use crate::geometry::Point;
 use crate::scene::Contact;
 
 /// Nodes of the image unless said otherwise, about.
@@ -326,6 +327,10 @@ impl ForwardModel for Slab {
         replaced: &[(usize, Contact)],
     ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), ForwardError> {
         self.discs(contacts)?.with_changes_ohm(replaced)
+    }
+
+    fn disc_fields(&self, place_m: Point, radius_m: f64) -> Result<DiscFields, ForwardError> {
+        self.fields_of_disc(place_m, radius_m)
     }
 
     fn rough(&self) -> Option<Arc<dyn ForwardModel>> {
