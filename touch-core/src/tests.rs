@@ -4,12 +4,19 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use crate::circuit::{Circuit, Spot};
 use crate::frame::Errors;
-use crate::normal::{ANY_RADIUS, Normal, PARAMETERS};
+use crate::normal::ANY_RADIUS;
 use crate::samples::{seal, table};
 use crate::table::MAX_ELECTRODES;
-use crate::{Flags, Frame, FrameError, Says, Solver, Table, TableError};
+use crate::vector::PARAMETERS;
+use crate::{BOARD_CONTACTS, Flags, Frame, FrameError, Says, Solver, Table, TableError};
+
+/// As on a board.
+pub(crate) type Spot = crate::circuit::Spot<f32>;
+pub(crate) type Circuit = crate::circuit::Circuit<f32, BOARD_CONTACTS>;
+pub(crate) type Normal = crate::normal::Normal<f32, BOARD_CONTACTS>;
+pub(crate) type Scene = crate::fit::Scene<f32, BOARD_CONTACTS>;
+pub(crate) type Fit = crate::fit::Fit<f32, BOARD_CONTACTS>;
 
 pub(crate) fn spot(x_m: f32, y_m: f32, sheets: f32) -> Spot {
     Spot { at_m: [x_m, y_m], ln_ohm: (1.0 / (sheets * 1.1e-3) + 600.0).ln(), ln_radius: 0.0 }
