@@ -1,7 +1,7 @@
 //! Contacts from frame to frame.
 //!
-//! What was found last is fitted again. Where that explains neither a frame nor the one before, more contacts are looked for beside it, and without it. One
-//! more is believed if it lowers the sum of squares by more than its parameters' price. What leaves too much is mended: one more where that would explain much,
+//! What was found last is fitted again. Where that does not explain a frame (of a [patient](Solver::patient) solver: nor the one before), more contacts are looked
+//! for beside it, and without it. One more is believed if it lowers the sum of squares by more than its parameters' price. What leaves too much is mended: one more where that would explain much,
 //! each in turn looked for anew beside the others, and one fewer where those that stay do as well.
 //!
 //! All that is done in pieces, each of which ends soon, so that whoever has something else to do between them can.
@@ -97,18 +97,20 @@ pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS> {
     wait: u32,
     /// Whether the last frame was not explained by what was followed, or there was none.
     was_lost: bool,
+    /// Whether one is waited for that is not explained either.
+    is_patient: bool,
 }
 
 impl<T: Real, const K: usize> Default for Solver<T, K> {
     fn default() -> Self {
-        Self::NEW
+        Self::blank(false)
     }
 }
 
 impl Solver {
-    /// A board's solver, that has seen nothing. One of other numbers and of more contacts is [`Solver::default`].
+    /// A solver that has seen nothing, in the numbers and for the contacts of a board; one of others is [`Solver::default`]. Each frame is answered by itself.
     pub const fn new() -> Self {
-        Self::NEW
+        Self::blank(false)
     }
 }
 
@@ -120,26 +122,35 @@ impl<T: Real, const K: usize> Solver<T, K> {
     /// readings up to 1400. Five contacts on `square-60` take more than 400 and fewer than 600.
     pub const MOST_PIECES: u32 = (600 * K * K / (BOARD_CONTACTS * BOARD_CONTACTS)) as u32;
 
-    const NEW: Self = Self {
-        circuit: Circuit::EMPTY,
-        fitting: Fitting::NONE,
-        search: Search::NONE,
-        stage: Stage::Idle,
-        piece: Piece::Fit,
-        work: Work::NONE,
-        pieces: 0,
-        scene: Scene::EMPTY,
-        ids: [0; K],
-        next_id: 1,
-        searched: T::ZERO,
-        patience: PATIENCE[0],
-        wait: 0,
-        was_lost: true,
-    };
+    /// One that waits, for frames whose rows are read one after the other: while something lands or lifts, these are not rows of one scene. A frame that what is
+    /// followed does not explain is flagged, keeps the contacts of the one before, and is searched only if the next one is not explained either.
+    pub const fn patient() -> Self {
+        Self::blank(true)
+    }
+
+    const fn blank(is_patient: bool) -> Self {
+        Self {
+            circuit: Circuit::EMPTY,
+            fitting: Fitting::NONE,
+            search: Search::NONE,
+            stage: Stage::Idle,
+            piece: Piece::Fit,
+            work: Work::NONE,
+            pieces: 0,
+            scene: Scene::EMPTY,
+            ids: [0; K],
+            next_id: 1,
+            searched: T::ZERO,
+            patience: PATIENCE[0],
+            wait: 0,
+            was_lost: true,
+            is_patient,
+        }
+    }
 
     /// Forgets the frames before.
     pub fn reset(&mut self) {
-        *self = Self::NEW;
+        *self = Self::blank(self.is_patient);
     }
 
     /// The contacts of a frame.
@@ -287,7 +298,8 @@ impl<T: Real, const K: usize> Solver<T, K> {
             (None, alone) => alone.is_some_and(|alone| alone[0].gain >= T::of(FIRST_GAIN)),
         };
         self.search.more &= found.is_some();
-        if is_lost && self.was_lost && self.may_search() {
+        let may_search = !self.is_patient || self.was_lost && self.may_search();
+        if is_lost && may_search {
             (self.stage, self.pieces) = (Stage::Searched, 0);
             let wants = self.search.begin(found, alone, readings);
             return self.prepare(wants, task);
