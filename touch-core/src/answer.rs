@@ -1,33 +1,50 @@
 //! What is found in a frame.
 
-use crate::circuit::MAX_CONTACTS;
 use crate::fit::Work;
+use crate::real::Real;
+use crate::solver::BOARD_CONTACTS;
 
 /// One contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Contact {
+pub struct Contact<T = f32> {
     /// Number that it keeps from frame to frame.
     pub id: u32,
     /// Centre, x (m).
-    pub x_m: f32,
+    pub x_m: T,
     /// Centre, y (m).
-    pub y_m: f32,
+    pub y_m: T,
     /// Conductance (S).
-    pub conductance_s: f32,
+    pub conductance_s: T,
     /// Standard error of the conductance (S).
-    pub conductance_sigma_s: f32,
+    pub conductance_sigma_s: T,
     /// Conductance of it in series with the current that crowds under it (S): of a firm contact readings give that far better.
-    pub apparent_conductance_s: f32,
+    pub apparent_conductance_s: T,
     /// Force (N), where the table has a law of force.
-    pub force_n: Option<f32>,
+    pub force_n: Option<T>,
     /// Radius (m), as far as the readings tell it; else the usual one.
-    pub radius_m: f32,
+    pub radius_m: T,
     /// Standard error of the radius (m).
-    pub radius_sigma_m: f32,
+    pub radius_sigma_m: T,
     /// Standard errors of x and y (m).
-    pub sigma_m: [f32; 2],
+    pub sigma_m: [T; 2],
     /// Correlation of the errors of x and y.
-    pub correlation: f32,
+    pub correlation: T,
+}
+
+impl<T: Real> Contact<T> {
+    const NONE: Self = Self {
+        id: 0,
+        x_m: T::ZERO,
+        y_m: T::ZERO,
+        conductance_s: T::ZERO,
+        conductance_sigma_s: T::ZERO,
+        apparent_conductance_s: T::ZERO,
+        force_n: None,
+        radius_m: T::ZERO,
+        radius_sigma_m: T::ZERO,
+        sigma_m: [T::ZERO; 2],
+        correlation: T::ZERO,
+    };
 }
 
 /// What to know before an answer is believed.
@@ -62,32 +79,39 @@ impl Flags {
     }
 }
 
-/// The answer for a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Answer {
-    contacts: [Contact; MAX_CONTACTS],
+/// The answer for a frame: up to `K` contacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer<T = f32, const K: usize = BOARD_CONTACTS> {
+    contacts: [Contact<T>; K],
     count: usize,
     /// What to know before it is believed.
     pub flags: Flags,
     /// Root mean square of what is left of the readings, in standard deviations of the noise and the table's own error.
-    pub residual: f32,
+    pub residual: T,
     /// Electrodes that are left out, since their wires are broken: a bit each.
     pub left_out: u32,
     /// What it took.
-    pub work: Work,
+    pub work: Work<K>,
 }
 
-impl Answer {
+impl<T: Real, const K: usize> Default for Answer<T, K> {
+    fn default() -> Self {
+        Self::of(Work::NONE)
+    }
+}
+
+impl<T: Real, const K: usize> Answer<T, K> {
     /// The contacts, those with the lowest numbers first.
-    pub fn contacts(&self) -> &[Contact] {
-        &self.contacts[..self.count.min(MAX_CONTACTS)]
+    pub fn contacts(&self) -> &[Contact<T>] {
+        &self.contacts[..self.count.min(K)]
     }
 
-    pub(crate) fn of(work: Work) -> Self {
-        Self { work, ..Self::default() }
+    pub(crate) fn of(work: Work<K>) -> Self {
+        let contacts = [Contact::NONE; K];
+        Self { contacts, count: 0, flags: Flags::default(), residual: T::ZERO, left_out: 0, work }
     }
 
-    pub(crate) fn add(&mut self, contact: Contact) {
+    pub(crate) fn add(&mut self, contact: Contact<T>) {
         if let Some(free) = self.contacts.get_mut(self.count) {
             *free = contact;
             self.count += 1;

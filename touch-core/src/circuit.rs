@@ -22,11 +22,9 @@
 
 use crate::fields::Sample;
 use crate::head::Head;
-use crate::normal::PARAMETERS;
+use crate::real::Real;
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, Table};
-
-/// Most contacts.
-pub const MAX_CONTACTS: usize = 3;
+use crate::vector::PARAMETERS;
 
 /// By what share that of a disc of even potential, `1 / (4 s R)`, is less.
 const CROWDED_LESS: f32 = 0.074_7;
@@ -49,108 +47,116 @@ const LEAST_OHM: f32 = 0.8;
 
 /// What is fitted of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Spot {
+pub(crate) struct Spot<T> {
     /// Where (m).
-    pub at_m: [f32; 2],
+    pub at_m: [T; 2],
     /// Logarithm of its resistance with that of the crowded current (ohm).
-    pub ln_ohm: f32,
+    pub ln_ohm: T,
     /// Logarithm of its spread over the usual radius: the radius of the disc of even current whose fields it has.
-    pub ln_radius: f32,
+    pub ln_radius: T,
+}
+
+impl<T: Real> Spot<T> {
+    /// None.
+    pub const NONE: Self = Self { at_m: [T::ZERO; 2], ln_ohm: T::ZERO, ln_radius: T::ZERO };
 }
 
 /// A vector over electrodes.
-pub(crate) type PerElectrode = [f32; MAX_ELECTRODES];
+pub(crate) type PerElectrode<T> = [T; MAX_ELECTRODES];
 
 /// How the current of a disc crowds.
-struct Disc {
-    radius_m: f32,
-    rest_ohm: f32,
-    moment_s_m2: f32,
+struct Disc<T> {
+    radius_m: T,
+    rest_ohm: T,
+    moment_s_m2: T,
 }
 
-impl Disc {
+impl<T: Real> Disc<T> {
     /// Of a disc whose current spreads so far, with an own field but for that on a deep layer, and a resistance with that of the crowded current.
-    fn of(head: &Head, spread_m: f32, field_ohm: f32, ohm: f32) -> Self {
-        let least_ohm = 1.0 / (FIRMEST_SHEETS * head.sheet_s);
-        let (mut crowded, mut radius_m, mut rest_ohm) = (0.5, spread_m, least_ohm);
+    fn of(head: &Head, spread_m: T, field_ohm: T, ohm: T) -> Self {
+        let least_ohm = T::ONE / (T::of(FIRMEST_SHEETS) * T::of(head.sheet_s));
+        let (mut crowded, mut radius_m, mut rest_ohm) = (T::of(0.5), spread_m, least_ohm);
         for _ in 0..CROWDING_STEPS {
-            radius_m = spread_m / libm::sqrtf(1.0 + CROWDED_WIDER * crowded);
+            radius_m = spread_m / (T::ONE + T::of(CROWDED_WIDER) * crowded).sqrt();
             let even_ohm = head.even_ohm(radius_m);
-            rest_ohm = (ohm - field_ohm - even_ohm * (1.0 - CROWDED_LESS * crowded)).max(least_ohm);
+            rest_ohm = (ohm - field_ohm - even_ohm * (T::ONE - T::of(CROWDED_LESS) * crowded)).max(least_ohm);
             // Crowded is so much of the current as the layer's resistance has of that of both.
             crowded = even_ohm / (even_ohm + rest_ohm);
         }
-        let (deep, thin) = (3.0 / (8.0 * head.top_s_per_m * radius_m), 1.0 / (core::f32::consts::TAU * head.sheet_s));
-        let of_layer = libm::sqrtf(deep * deep + thin * thin);
-        Self { radius_m, rest_ohm, moment_s_m2: radius_m * radius_m / (4.0 * rest_ohm + of_layer) }
+        let (deep, thin) = (
+            T::of(3.0) / (T::of(8.0) * T::of(head.top_s_per_m) * radius_m),
+            T::ONE / (T::of(core::f64::consts::TAU) * T::of(head.sheet_s)),
+        );
+        let of_layer = (deep * deep + thin * thin).sqrt();
+        Self { radius_m, rest_ohm, moment_s_m2: radius_m * radius_m / (T::of(4.0) * rest_ohm + of_layer) }
     }
 }
 
 /// One contact in the circuit.
 #[derive(Clone, Debug)]
-pub(crate) struct Loaded {
-    pub spot: Spot,
+pub(crate) struct Loaded<T> {
+    pub spot: Spot<T>,
     /// Of its place. Once currents are known, what turns its slopes is, of electrodes, the moment times the derivatives of what drives the couples: of that along x by x,
     /// by y (or of that along y by x), of that along y by y, in usual radii; then of both by the radius' logarithm.
-    pub sample: Sample,
+    pub sample: Sample<T>,
     /// Derivatives of the electrodes' fields by the logarithm of the radius (ohm).
-    pub by_radius_ohm: PerElectrode,
+    pub by_radius_ohm: PerElectrode<T>,
     /// `Q b` of its place.
-    walls_ohm: [f32; MAX_ELECTRODES + 1],
+    walls_ohm: [T; MAX_ELECTRODES + 1],
     /// Resistance with that of the crowded current (ohm).
-    pub ohm: f32,
+    pub ohm: T,
     /// Part of it that is on the detector.
-    pub share: f32,
+    pub share: T,
     /// Its radius (m).
-    pub radius_m: f32,
+    pub radius_m: T,
     /// Resistance without that of the crowded current (ohm).
-    rest_ohm: f32,
+    rest_ohm: T,
     /// Own field of a disc of even current of its radius on a deep layer (ohm).
-    even_ohm: f32,
+    even_ohm: T,
     /// Change of the way from the small to the wide disc with the logarithm of the spread.
-    per_ln_radius: f32,
+    per_ln_radius: T,
     /// Moment of current that a slope of potential drives (S m2).
-    pub moment_s_m2: f32,
+    pub moment_s_m2: T,
     /// Half of its derivatives by the parameters.
-    pub half_moment_by: [f32; PARAMETERS],
+    pub half_moment_by: [T; PARAMETERS],
     /// Currents for 1 A into each electrode.
-    pub currents: PerElectrode,
+    pub currents: PerElectrode<T>,
     /// Slopes of the potential along x and y (ohm/m), likewise.
-    pub slopes_ohm_per_m: [PerElectrode; 2],
+    pub slopes_ohm_per_m: [PerElectrode<T>; 2],
     /// Slopes that drive the couples of currents (ohm/m): those less half of the slope of the contact's own field.
-    pub driving_ohm_per_m: [PerElectrode; 2],
+    pub driving_ohm_per_m: [PerElectrode<T>; 2],
 }
 
-impl Loaded {
+impl<T: Real> Loaded<T> {
     const NONE: Self = Self {
-        spot: Spot { at_m: [0.0; 2], ln_ohm: 0.0, ln_radius: 0.0 },
+        spot: Spot::NONE,
         sample: Sample::NONE,
-        by_radius_ohm: [0.0; MAX_ELECTRODES],
-        walls_ohm: [0.0; MAX_ELECTRODES + 1],
-        ohm: 0.0,
-        share: 1.0,
-        radius_m: 0.0,
-        rest_ohm: 0.0,
-        even_ohm: 0.0,
-        per_ln_radius: 0.0,
-        moment_s_m2: 0.0,
-        half_moment_by: [0.0; PARAMETERS],
-        currents: [0.0; MAX_ELECTRODES],
-        slopes_ohm_per_m: [[0.0; MAX_ELECTRODES]; 2],
-        driving_ohm_per_m: [[0.0; MAX_ELECTRODES]; 2],
+        by_radius_ohm: [T::ZERO; MAX_ELECTRODES],
+        walls_ohm: [T::ZERO; MAX_ELECTRODES + 1],
+        ohm: T::ZERO,
+        share: T::ONE,
+        radius_m: T::ZERO,
+        rest_ohm: T::ZERO,
+        even_ohm: T::ZERO,
+        per_ln_radius: T::ZERO,
+        moment_s_m2: T::ZERO,
+        half_moment_by: [T::ZERO; PARAMETERS],
+        currents: [T::ZERO; MAX_ELECTRODES],
+        slopes_ohm_per_m: [[T::ZERO; MAX_ELECTRODES]; 2],
+        driving_ohm_per_m: [[T::ZERO; MAX_ELECTRODES]; 2],
     };
 
     /// Puts a contact there.
-    fn load(&mut self, table: &Table<'_>, spot: Spot) {
+    fn load(&mut self, table: &Table<'_>, spot: Spot<T>) {
         let (head, n) = (table.head(), table.electrodes());
-        let spread_m = head.radius_m * libm::expf(spot.ln_radius);
-        let [small_m2, wide_m2] = head.radii_m.map(|radius_m| radius_m * radius_m);
-        let per_m2 = 1.0 / (wide_m2 - small_m2);
+        let spread_m = T::of(head.radius_m) * spot.ln_radius.exp();
+        let [small_m2, wide_m2] = head.radii_m.map(|radius_m| T::of(radius_m) * T::of(radius_m));
+        let per_m2 = T::ONE / (wide_m2 - small_m2);
         self.spot = spot;
         table.sample(spot.at_m, per_m2 * (spread_m * spread_m - small_m2), &mut self.sample);
-        self.share = self.sample.value[n + 1].clamp(LEAST_SHARE, 1.0);
-        self.ohm = libm::expf(spot.ln_ohm).max(LEAST_OHM * (self.sample.value[n] + head.even_ohm(spread_m)));
-        self.per_ln_radius = 2.0 * per_m2 * spread_m * spread_m;
+        self.share = self.sample.value[n + 1].clamp(T::of(LEAST_SHARE), T::ONE);
+        self.ohm = spot.ln_ohm.exp().max(T::of(LEAST_OHM) * (self.sample.value[n] + head.even_ohm(spread_m)));
+        self.per_ln_radius = T::of(2.0) * per_m2 * spread_m * spread_m;
         self.crowd(head, spread_m, n);
         for e in 0..n {
             self.by_radius_ohm[e] = self.per_ln_radius * self.sample.wider[e];
@@ -159,27 +165,27 @@ impl Loaded {
     }
 
     /// Finds how the current crowds, and what moment a slope drives.
-    fn crowd(&mut self, head: &Head, spread_m: f32, n: usize) {
+    fn crowd(&mut self, head: &Head, spread_m: T, n: usize) {
         let (ohm, own_ohm) = (self.ohm, self.sample.value[n]);
         let disc = Disc::of(head, spread_m, own_ohm, ohm);
         (self.radius_m, self.rest_ohm, self.even_ohm) = (disc.radius_m, disc.rest_ohm, head.even_ohm(disc.radius_m));
         self.moment_s_m2 = disc.moment_s_m2;
-        let half_by = |other: Disc, step: f32| 0.5 * (other.moment_s_m2 - disc.moment_s_m2) / step;
-        let by_ln_ohm = half_by(Disc::of(head, spread_m, own_ohm, ohm * (1.0 + STEP)), STEP);
-        let by_own = half_by(Disc::of(head, spread_m, own_ohm - STEP * ohm, ohm), -STEP * ohm);
-        let by_ln_radius = half_by(Disc::of(head, spread_m * (1.0 + STEP), own_ohm, ohm), STEP);
-        let by_place = |d: usize| by_own * head.radius_m * self.sample.slope[d][n];
+        let half_by = |other: Disc<T>, step: T| T::of(0.5) * (other.moment_s_m2 - disc.moment_s_m2) / step;
+        let by_ln_ohm = half_by(Disc::of(head, spread_m, own_ohm, ohm * (T::ONE + T::of(STEP))), T::of(STEP));
+        let by_own = half_by(Disc::of(head, spread_m, own_ohm - T::of(STEP) * ohm, ohm), -T::of(STEP) * ohm);
+        let by_ln_radius = half_by(Disc::of(head, spread_m * (T::ONE + T::of(STEP)), own_ohm, ohm), T::of(STEP));
+        let by_place = |d: usize| by_own * T::of(head.radius_m) * self.sample.slope[d][n];
         let by_wider = by_own * self.per_ln_radius * self.sample.wider[n];
         self.half_moment_by = [by_place(0), by_place(1), by_ln_ohm, by_ln_radius + by_wider];
     }
 
     /// Finds what drives the couples of currents at an electrode, and how that changes.
     fn drive(&mut self, head: &Head, n: usize, e: usize) {
-        let half = 0.5 * self.currents[e];
+        let half = T::of(0.5) * self.currents[e];
         for d in 0..2 {
             self.driving_ohm_per_m[d][e] = self.slopes_ohm_per_m[d][e] - half * self.sample.slope[d][n];
         }
-        let by_place = self.moment_s_m2 * head.radius_m;
+        let by_place = self.moment_s_m2 * T::of(head.radius_m);
         let by_radius = self.moment_s_m2 * self.per_ln_radius;
         let units = [by_place, by_place, by_place, by_radius, by_radius];
         for (turning, unit) in self.sample.turning.iter_mut().zip(units) {
@@ -188,59 +194,54 @@ impl Loaded {
     }
 
     /// Conductance (S), with that of the part that is not on the detector.
-    pub fn conductance_s(&self) -> f32 {
-        1.0 / (self.share * self.rest_ohm)
+    pub fn conductance_s(&self) -> T {
+        T::ONE / (self.share * self.rest_ohm)
     }
 
     /// Variance of the conductance's logarithm, from the covariance of the contact's parameters with places in so many metres.
-    pub fn conductance_variance(
-        &self,
-        table: &Table<'_>,
-        unit_m: f32,
-        covariance: impl Fn(usize, usize) -> f32,
-    ) -> f32 {
+    pub fn conductance_variance(&self, table: &Table<'_>, unit_m: T, covariance: impl Fn(usize, usize) -> T) -> T {
         let n = table.electrodes();
-        let is_cut = self.share > LEAST_SHARE && self.share < 1.0;
+        let is_cut = self.share > T::of(LEAST_SHARE) && self.share < T::ONE;
         let by_place = |d: usize| {
-            let of_share = if is_cut { self.sample.slope[d][n + 1] / self.share } else { 0.0 };
+            let of_share = if is_cut { self.sample.slope[d][n + 1] / self.share } else { T::ZERO };
             unit_m * (self.sample.slope[d][n] / self.rest_ohm - of_share)
         };
         let by_radius_ohm = self.per_ln_radius * self.sample.wider[n] - self.even_ohm;
         let slopes = [by_place(0), by_place(1), -self.ohm / self.rest_ohm, by_radius_ohm / self.rest_ohm];
-        let own = OWN_ERROR * self.even_ohm / self.rest_ohm;
+        let own = T::of(OWN_ERROR) * self.even_ohm / self.rest_ohm;
         let pairs = (0..PARAMETERS).flat_map(|i| (0..PARAMETERS).map(move |j| (i, j)));
-        pairs.fold(own * own, |sum, (i, j)| sum + slopes[i] * slopes[j] * covariance(i, j)).max(0.0)
+        pairs.fold(own * own, |sum, (i, j)| sum + slopes[i] * slopes[j] * covariance(i, j)).max(T::ZERO)
     }
 }
 
 /// Contacts, with all that the readings follow from.
 #[derive(Clone, Debug)]
-pub(crate) struct Circuit {
+pub(crate) struct Circuit<T, const K: usize> {
     pub count: usize,
-    pub loaded: [Loaded; MAX_CONTACTS],
+    pub loaded: [Loaded<T>; K],
     /// The constant of each electrode's ampere (ohm).
-    pub constant_ohm: PerElectrode,
+    pub constant_ohm: PerElectrode<T>,
     /// `Z[g][g]` with the switch (ohm).
-    pub loads_ohm: PerElectrode,
+    pub loads_ohm: PerElectrode<T>,
 }
 
-impl Circuit {
+impl<T: Real, const K: usize> Circuit<T, K> {
     pub const EMPTY: Self = Self {
         count: 0,
-        loaded: [Loaded::NONE; MAX_CONTACTS],
-        constant_ohm: [0.0; MAX_ELECTRODES],
-        loads_ohm: [0.0; MAX_ELECTRODES],
+        loaded: [Loaded::NONE; K],
+        constant_ohm: [T::ZERO; MAX_ELECTRODES],
+        loads_ohm: [T::ZERO; MAX_ELECTRODES],
     };
 
-    /// Solves for some contacts, [`MAX_CONTACTS`] at most; `false` if their fields cannot be those of contacts, as when two are at one place.
-    pub fn solve(&mut self, table: &Table<'_>, spots: &[Spot]) -> bool {
-        self.count = spots.len().min(MAX_CONTACTS);
+    /// Solves for some contacts, `K` at most; `false` if their fields cannot be those of contacts, as when two are at one place.
+    pub fn solve(&mut self, table: &Table<'_>, spots: &[Spot<T>]) -> bool {
+        self.count = spots.len().min(K);
         for (loaded, spot) in self.loaded.iter_mut().zip(spots) {
             loaded.load(table, *spot);
         }
-        let mut matrix = [[0.0; MAX_CONTACTS]; MAX_CONTACTS];
+        let mut matrix = [[T::ZERO; K]; K];
         // Derivatives of the field at contact k from contact l, by the place of k.
-        let mut slopes = [[[0.0; 2]; MAX_CONTACTS]; MAX_CONTACTS];
+        let mut slopes = [[[T::ZERO; 2]; K]; K];
         for k in 0..self.count {
             matrix[k][k] = self.loaded[k].ohm;
             for l in (0..self.count).filter(|l| *l != k) {
@@ -255,11 +256,11 @@ impl Circuit {
     }
 
     /// Field of contact `l` at contact `k` (ohm), and its derivatives by the place of `k` (ohm/m).
-    fn between(&self, table: &Table<'_>, k: usize, l: usize) -> (f32, [f32; 2]) {
+    fn between(&self, table: &Table<'_>, k: usize, l: usize) -> (T, [T; 2]) {
         let (at, from) = (&self.loaded[k], &self.loaded[l]);
         let n = table.electrodes();
         let way_m = [0, 1].map(|d| at.spot.at_m[d] - from.spot.at_m[d]);
-        let distance_m = libm::sqrtf(way_m[0] * way_m[0] + way_m[1] * way_m[1]).max(1e-9);
+        let distance_m = (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt().max(T::of(1e-9));
         let (mut ohm, per_m) = table.by_distance_ohm(distance_m);
         let mut slope = way_m.map(|way_m| per_m * way_m / distance_m);
         ohm += from.walls_ohm[n];
@@ -270,54 +271,54 @@ impl Circuit {
         (ohm, slope)
     }
 
-    fn find_currents(&mut self, table: &Table<'_>, matrix: &[[f32; MAX_CONTACTS]; MAX_CONTACTS]) -> bool {
+    fn find_currents(&mut self, table: &Table<'_>, matrix: &[[T; K]; K]) -> bool {
         let count = self.count;
-        let mut factor = [[0.0; MAX_CONTACTS]; MAX_CONTACTS];
+        let mut factor = [[T::ZERO; K]; K];
         for i in 0..count {
             for j in 0..=i {
-                let sum: f32 = matrix[i][j] - (0..j).map(|k| factor[i][k] * factor[j][k]).sum::<f32>();
+                let sum: T = matrix[i][j] - (0..j).map(|k| factor[i][k] * factor[j][k]).sum::<T>();
                 if i != j {
                     factor[i][j] = sum / factor[j][j];
-                } else if sum > 1e-3 * matrix[i][i] {
-                    factor[i][i] = libm::sqrtf(sum);
+                } else if sum > T::of(1e-3) * matrix[i][i] {
+                    factor[i][i] = sum.sqrt();
                 } else {
                     return false;
                 }
             }
         }
-        let solve = |mut right: [f32; MAX_CONTACTS]| {
+        let solve = |mut right: [T; K]| {
             for i in 0..count {
-                let sum: f32 = (0..i).map(|j| factor[i][j] * right[j]).sum();
+                let sum: T = (0..i).map(|j| factor[i][j] * right[j]).sum();
                 right[i] = (right[i] - sum) / factor[i][i];
             }
             for i in (0..count).rev() {
-                let sum: f32 = (i + 1..count).map(|j| factor[j][i] * right[j]).sum();
+                let sum: T = (i + 1..count).map(|j| factor[j][i] * right[j]).sum();
                 right[i] = (right[i] - sum) / factor[i][i];
             }
             right
         };
-        let of_one = solve([1.0; MAX_CONTACTS]);
-        let conductance_s: f32 = of_one.iter().take(count).sum();
-        if !(conductance_s > 0.0 && conductance_s.is_finite()) {
+        let of_one = solve([T::ONE; K]);
+        let conductance_s: T = of_one.iter().copied().take(count).sum();
+        if !(conductance_s > T::ZERO && conductance_s.is_finite()) {
             return false;
         }
         for e in 0..table.electrodes() {
-            let mut right = [0.0; MAX_CONTACTS];
+            let mut right = [T::ZERO; K];
             (0..count).for_each(|k| right[k] = self.loaded[k].sample.value[e]);
             let of_fields = solve(right);
-            let constant_ohm = (of_fields.iter().take(count).sum::<f32>() - 1.0) / conductance_s;
+            let constant_ohm = (of_fields.iter().copied().take(count).sum::<T>() - T::ONE) / conductance_s;
             self.constant_ohm[e] = constant_ohm;
             (0..count).for_each(|k| self.loaded[k].currents[e] = of_fields[k] - of_one[k] * constant_ohm);
         }
         true
     }
 
-    fn find_slopes(&mut self, table: &Table<'_>, slopes: &[[[f32; 2]; MAX_CONTACTS]; MAX_CONTACTS]) {
+    fn find_slopes(&mut self, table: &Table<'_>, slopes: &[[[T; 2]; K]; K]) {
         for k in 0..self.count {
             for d in 0..2 {
                 for e in 0..table.electrodes() {
                     let others = (0..self.count).filter(|l| *l != k);
-                    let by_others: f32 = others.map(|l| slopes[k][l][d] * self.loaded[l].currents[e]).sum();
+                    let by_others: T = others.map(|l| slopes[k][l][d] * self.loaded[l].currents[e]).sum();
                     self.loaded[k].slopes_ohm_per_m[d][e] = self.loaded[k].sample.slope[d][e] - by_others;
                 }
             }
@@ -328,12 +329,12 @@ impl Circuit {
 
     fn find_loads(&mut self, table: &Table<'_>) -> bool {
         for g in 0..table.electrodes() {
-            let mut ohm = table.pads_ohm(g, g) - self.constant_ohm[g] + table.head().on_resistance_ohm;
+            let mut ohm = T::of(table.pads_ohm(g, g)) - self.constant_ohm[g] + T::of(table.head().on_resistance_ohm);
             for one in &self.loaded[..self.count] {
                 let [x, y] = [0, 1].map(|d| one.driving_ohm_per_m[d][g]);
                 ohm -= one.sample.value[g] * one.currents[g] + one.moment_s_m2 * (x * x + y * y);
             }
-            if !(ohm > 0.0 && ohm.is_finite()) {
+            if !(ohm > T::ZERO && ohm.is_finite()) {
                 return false;
             }
             self.loads_ohm[g] = ohm;
@@ -342,12 +343,13 @@ impl Circuit {
     }
 
     /// The readings with one electrode grounded (V).
-    pub fn row_v(&self, table: &Table<'_>, g: usize, volts: &mut PerElectrode) {
+    pub fn row_v(&self, table: &Table<'_>, g: usize, volts: &mut PerElectrode<T>) {
         let head = table.head();
-        let (own_ohm, per_ohm) = (table.pads_ohm(g, g) + head.on_resistance_ohm, head.drive_v / self.loads_ohm[g]);
+        let (own_ohm, per_ohm) =
+            (T::of(table.pads_ohm(g, g)) + T::of(head.on_resistance_ohm), T::of(head.drive_v) / self.loads_ohm[g]);
         // Differences, so that the resistance of a light contact, thousands of times as much, does not take their digits.
         for (e, volts) in volts.iter_mut().enumerate().take(table.electrodes()) {
-            let mut ohm = own_ohm - table.pads_ohm(e, g);
+            let mut ohm = own_ohm - T::of(table.pads_ohm(e, g));
             for one in &self.loaded[..self.count] {
                 let along = |d: usize| {
                     let here = one.driving_ohm_per_m[d][g];
@@ -364,9 +366,9 @@ impl Circuit {
     pub fn potentials_ohm(
         &self,
         table: &Table<'_>,
-        at_m: [f32; 2],
-        fields_ohm: &PerElectrode,
-        all_ohm: &mut PerElectrode,
+        at_m: [T; 2],
+        fields_ohm: &PerElectrode<T>,
+        all_ohm: &mut PerElectrode<T>,
     ) {
         let n = table.electrodes();
         for e in 0..n {
@@ -374,8 +376,8 @@ impl Circuit {
         }
         for one in &self.loaded[..self.count] {
             let way_m = [0, 1].map(|d| at_m[d] - one.spot.at_m[d]);
-            let distance_m = libm::sqrtf(way_m[0] * way_m[0] + way_m[1] * way_m[1]);
-            let by_walls: f32 = (0..n).map(|e| one.walls_ohm[e] * fields_ohm[e]).sum();
+            let distance_m = (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt();
+            let by_walls: T = (0..n).map(|e| one.walls_ohm[e] * fields_ohm[e]).sum();
             let ohm = table.by_distance_ohm(distance_m).0 + by_walls + one.walls_ohm[n];
             (0..n).for_each(|e| all_ohm[e] -= ohm * one.currents[e]);
         }

@@ -1,9 +1,11 @@
 //! Damped Gauss-Newton steps of contacts to the readings of a frame, one look at them at a time.
 
-use crate::circuit::{Circuit, MAX_CONTACTS, Spot};
-use crate::normal::{ANY_RADIUS, Normal, PARAMETERS, Vector};
-use crate::solver::Task;
+use crate::circuit::{Circuit, Spot};
+use crate::normal::Normal;
+use crate::real::Real;
+use crate::solver::{BOARD_CONTACTS, Task};
 use crate::table::Table;
+use crate::vector::Vector;
 
 /// Longest way in a step, in usual radii, and longest change of a logarithm.
 const LONGEST_WAY: f32 = 2.0;
@@ -20,23 +22,22 @@ pub(crate) const LN_RADII: [f32; 2] = [-1.6, 1.1];
 /// Resistances, as logarithms of those of a square of the layer: a contact of 1e-6 squares is nothing, and none leads better than a fifth of one.
 pub(crate) const LN_SQUARES: [f32; 2] = [-3.0, 13.8];
 
-/// Contacts of a scene, [`MAX_CONTACTS`] at most.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Scene {
+/// Contacts of a scene, `K` at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Scene<T, const K: usize> {
     pub count: usize,
-    pub spots: [Spot; MAX_CONTACTS],
+    pub spots: [Spot<T>; K],
 }
 
-impl Scene {
-    pub const EMPTY: Self =
-        Self { count: 0, spots: [Spot { at_m: [0.0; 2], ln_ohm: 0.0, ln_radius: 0.0 }; MAX_CONTACTS] };
+impl<T: Real, const K: usize> Scene<T, K> {
+    pub const EMPTY: Self = Self { count: 0, spots: [Spot::NONE; K] };
 
-    pub fn spots(&self) -> &[Spot] {
-        &self.spots[..self.count.min(MAX_CONTACTS)]
+    pub fn spots(&self) -> &[Spot<T>] {
+        &self.spots[..self.count.min(K)]
     }
 
     /// The scene with one more; itself if it has all that there may be.
-    pub fn with(mut self, spot: Spot) -> Self {
+    pub fn with(mut self, spot: Spot<T>) -> Self {
         if let Some(free) = self.spots.get_mut(self.count) {
             *free = spot;
             self.count += 1;
@@ -47,41 +48,42 @@ impl Scene {
     /// The scene without one.
     pub fn without(self, index: usize) -> Self {
         let kept = self.spots().iter().enumerate().filter(|(k, _)| *k != index);
-        kept.fold(Self::default(), |scene, (_, spot)| scene.with(*spot))
+        kept.fold(Self::EMPTY, |scene, (_, spot)| scene.with(*spot))
     }
 
-    fn moved(&self, step: &Vector, table: &Table<'_>) -> Self {
+    fn moved(&self, step: &Vector<T, K>, table: &Table<'_>) -> Self {
         let mut moved = *self;
         let head = table.head();
-        for (spot, step) in moved.spots.iter_mut().zip(step.as_chunks::<PARAMETERS>().0).take(self.count) {
+        for (spot, step) in moved.spots.iter_mut().zip(&step.0).take(self.count) {
             let [x, y, ln_ohm, ln_radius] = *step;
-            let shorter = head.radius_m * (LONGEST_WAY / libm::sqrtf(x * x + y * y).max(1e-9)).min(1.0);
-            let held = |step: f32| step.clamp(-LONGEST_LOG, LONGEST_LOG);
+            let shorter =
+                T::of(head.radius_m) * (T::of(LONGEST_WAY) / (x * x + y * y).sqrt().max(T::of(1e-9))).min(T::ONE);
+            let held = |step: T| step.clamp(-T::of(LONGEST_LOG), T::of(LONGEST_LOG));
             let to_m = table.held([spot.at_m[0] + shorter * x, spot.at_m[1] + shorter * y]);
             if table.holds(to_m[0], to_m[1]) {
                 spot.at_m = to_m;
             }
             spot.ln_ohm = held_ohm(spot.ln_ohm + held(ln_ohm), table);
-            spot.ln_radius = (spot.ln_radius + held(ln_radius)).clamp(LN_RADII[0], LN_RADII[1]);
+            spot.ln_radius = (spot.ln_radius + held(ln_radius)).clamp(T::of(LN_RADII[0]), T::of(LN_RADII[1]));
         }
         moved
     }
 }
 
 /// The nearest resistance that a contact may have, as logarithms (ohm).
-pub(crate) fn held_ohm(ln_ohm: f32, table: &Table<'_>) -> f32 {
-    let square = -libm::logf(table.head().sheet_s);
-    ln_ohm.max(square + LN_SQUARES[0]).min(square + LN_SQUARES[1])
+pub(crate) fn held_ohm<T: Real>(ln_ohm: T, table: &Table<'_>) -> T {
+    let square = -T::of(table.head().sheet_s).ln();
+    ln_ohm.max(square + T::of(LN_SQUARES[0])).min(square + T::of(LN_SQUARES[1]))
 }
 
 /// What was done so far.
-pub(crate) struct Working<'a> {
-    pub done: &'a mut Work,
+pub(crate) struct Working<'a, const K: usize> {
+    pub done: &'a mut Work<K>,
     /// Called after each piece of it.
     pub attend: &'a mut dyn FnMut(),
 }
 
-impl Working<'_> {
+impl<const K: usize> Working<'_, K> {
     /// The readings of so many contacts and their derivatives were worked out.
     fn worked_out(&mut self, contacts: usize) {
         self.done.frames[contacts - 1] += 1;
@@ -102,89 +104,99 @@ impl Working<'_> {
 }
 
 /// What an answer took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Work {
-    /// Times that the readings of one, two or three contacts and all their derivatives were worked out.
-    pub frames: [u32; MAX_CONTACTS],
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Work<const K: usize = BOARD_CONTACTS> {
+    /// Times that the readings of one, two and up to `K` contacts and all their derivatives were worked out.
+    pub frames: [u32; K],
     /// Places that were looked at for a first contact.
     pub first_looks: u32,
     /// Places that were looked at for one more.
     pub looks: u32,
 }
 
+impl<const K: usize> Work<K> {
+    pub(crate) const NONE: Self = Self { frames: [0; K], first_looks: 0, looks: 0 };
+}
+
+impl<const K: usize> Default for Work<K> {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
 /// Contacts that were fitted to a frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Fit {
-    pub scene: Scene,
+pub(crate) struct Fit<T, const K: usize> {
+    pub scene: Scene<T, K>,
     /// Sum of squares of what they leave, and the same with what was known of radii before.
-    pub cost: f32,
-    pub objective: f32,
+    pub cost: T,
+    pub objective: T,
     /// What the readings say for each contact (squared deviations).
-    pub information: [f32; MAX_CONTACTS],
+    pub information: [T; K],
     /// Standard deviation of the logarithms of radii that they were fitted with.
-    pub radius_deviation: f32,
+    pub radius_deviation: T,
     /// Whether it is known that one more contact beside these would not be worth its price.
     pub is_alone: bool,
 }
 
-impl Fit {
+impl<T: Real, const K: usize> Fit<T, K> {
     /// No contact.
     pub const NONE: Self = Self {
         scene: Scene::EMPTY,
-        cost: 0.0,
-        objective: 0.0,
-        information: [0.0; MAX_CONTACTS],
-        radius_deviation: ANY_RADIUS,
+        cost: T::ZERO,
+        objective: T::ZERO,
+        information: [T::ZERO; K],
+        radius_deviation: T::ZERO,
         is_alone: false,
     };
 }
 
 /// How a fit goes on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Went {
+pub(crate) enum Went<T, const K: usize> {
     /// It has not ended.
     On,
     /// It has ended: with this, or with nothing if the scene makes no sense.
-    ToEnd(Option<Fit>),
+    ToEnd(Option<Fit<T, K>>),
 }
 
 /// A fit under way.
 #[derive(Clone, Debug)]
-pub(crate) struct Fitting {
-    scene: Scene,
+pub(crate) struct Fitting<T, const K: usize> {
+    scene: Scene<T, K>,
     /// Of the scene.
-    pub normal: Normal,
+    pub normal: Normal<T, K>,
     /// What is looked at next.
-    trial: Scene,
-    radius_deviation: f32,
-    damping: f32,
+    trial: Scene<T, K>,
+    radius_deviation: T,
+    damping: T,
     /// Steps that it may still take, and tries of the next one so far.
     steps: u8,
     tries: u8,
     has_looked: bool,
 }
 
-impl Fitting {
+impl<T: Real, const K: usize> Fitting<T, K> {
     /// One that has nothing to do.
     pub const NONE: Self = Self {
         scene: Scene::EMPTY,
         normal: Normal::EMPTY,
         trial: Scene::EMPTY,
-        radius_deviation: ANY_RADIUS,
-        damping: FIRST_DAMPING,
+        radius_deviation: T::ZERO,
+        damping: T::ZERO,
         steps: 0,
         tries: 0,
         has_looked: false,
     };
 
     /// Begins to step from a scene to where it fits best, so many steps at most.
-    pub fn begin(&mut self, scene: Scene, radius_deviation: f32, steps: u8) {
+    pub fn begin(&mut self, scene: Scene<T, K>, radius_deviation: T, steps: u8) {
         (self.scene, self.trial, self.radius_deviation) = (scene, scene, radius_deviation);
-        (self.damping, self.steps, self.tries, self.has_looked) = (FIRST_DAMPING, steps, 0, false);
+        (self.damping, self.steps, self.tries, self.has_looked) = (T::of(FIRST_DAMPING), steps, 0, false);
     }
 
     /// Takes one look.
-    pub fn go_on(&mut self, task: Task<'_>, circuit: &mut Circuit, work: &mut Working<'_>) -> Went {
+    pub fn go_on(&mut self, task: Task<'_, T>, circuit: &mut Circuit<T, K>, work: &mut Working<'_, K>) -> Went<T, K> {
         if !self.has_looked {
             self.has_looked = true;
             if !look(task, circuit, &self.trial, self.radius_deviation, &mut self.normal, work) {
@@ -195,15 +207,15 @@ impl Fitting {
             let makes_sense = look(task, circuit, &self.trial, self.radius_deviation, &mut normal, work);
             if makes_sense && normal.objective() < self.normal.objective() {
                 (self.scene, self.normal) = (self.trial, normal);
-                self.damping = (self.damping / DAMPING_STEP).max(LEAST_DAMPING);
+                self.damping = (self.damping / T::of(DAMPING_STEP)).max(T::of(LEAST_DAMPING));
                 (self.steps, self.tries) = (self.steps - 1, 0);
             } else {
-                self.damping *= DAMPING_STEP;
+                self.damping *= T::of(DAMPING_STEP);
                 self.tries += 1;
             }
         }
         let may_step = self.steps > 0 && self.tries < TRIES;
-        match self.normal.step(self.damping).filter(|(_, gain)| may_step && *gain >= LEAST_GAIN) {
+        match self.normal.step(self.damping).filter(|(_, gain)| may_step && *gain >= T::of(LEAST_GAIN)) {
             Some((step, _)) => {
                 self.trial = self.scene.moved(&step, task.table);
                 Went::On
@@ -212,7 +224,7 @@ impl Fitting {
         }
     }
 
-    fn fit(&self) -> Fit {
+    fn fit(&self) -> Fit<T, K> {
         Fit {
             scene: self.scene,
             cost: self.normal.cost,
@@ -225,13 +237,13 @@ impl Fitting {
 }
 
 /// What a scene leaves of a frame; `false` if it makes no sense.
-fn look(
-    Task { table, frame, errors }: Task<'_>,
-    circuit: &mut Circuit,
-    scene: &Scene,
-    radius_deviation: f32,
-    normal: &mut Normal,
-    work: &mut Working<'_>,
+fn look<T: Real, const K: usize>(
+    Task { table, frame, errors }: Task<'_, T>,
+    circuit: &mut Circuit<T, K>,
+    scene: &Scene<T, K>,
+    radius_deviation: T,
+    normal: &mut Normal<T, K>,
+    work: &mut Working<'_, K>,
 ) -> bool {
     if scene.count == 0 || !circuit.solve(table, scene.spots()) {
         return false;

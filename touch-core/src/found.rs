@@ -2,17 +2,20 @@
 
 use std::vec::Vec;
 
-use crate::circuit::Circuit;
-use crate::fit::{Fit, Fitting, Scene, Went};
+use crate::fit::{Fitting, Went};
 use crate::frame::Errors;
 use crate::laws::{ALL, solved, summed, tables};
-use crate::normal::{ANY_RADIUS, PARAMETERS, USUAL_RADIUS};
+use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
 use crate::samples::{CELLS, grid_m, table, table_of};
-use crate::scan::{Candidate, NO_CANDIDATES, first};
-use crate::search::{Search, Wants};
+use crate::scan::{Candidate, Candidates, first, no_candidates};
 use crate::solver::Task;
-use crate::tests::{noisy, spot, volts};
-use crate::{Flags, Frame, MOST_PIECES, Says, Solver, Table};
+use crate::tests::{Circuit, Fit, Scene, Spot, noisy, spot, volts};
+use crate::vector::PARAMETERS;
+use crate::{Flags, Frame, Says, Solver, Table};
+
+type Search = crate::search::Search<f32, 3>;
+type Wants = crate::search::Wants<f32, 3>;
+const MOST_PIECES: u32 = <Solver>::MOST_PIECES;
 
 #[test]
 fn a_first_contact_is_where_it_is_for_any_number_of_electrodes_and_they_may_be_counted_anew() {
@@ -28,7 +31,7 @@ fn a_first_contact_is_where_it_is_for_any_number_of_electrodes_and_they_may_be_c
             let [frame, moved] = [&read, &moved].map(|volts| Frame::of_volts(volts));
             if let [alone] = truth {
                 let errors = Errors::of(&frame, &table);
-                let (mut done, mut calls) = (crate::Work::default(), 0);
+                let (mut done, mut calls) = (<crate::Work>::default(), 0);
                 let mut attend = || calls += 1;
                 let mut work = crate::fit::Working { done: &mut done, attend: &mut attend };
                 let found = first(Task { table: &table, frame: &frame, errors: &errors }, &mut work)[0];
@@ -166,7 +169,7 @@ fn a_search_ends_on_any_readings_and_says_so() {
             let spot = spot(0.05 * random() - 0.025, 0.05 * random() - 0.025, 10f32.powf(3.0 * random() - 2.0));
             volts(&table, &[spot]).iter().zip(&mut read).for_each(|(v, sum)| *sum += v);
         }
-        let mut solver = Solver::new();
+        let mut solver = <Solver>::patient();
         let mut pieces = 0;
         let answer = loop {
             pieces += 1;
@@ -176,7 +179,7 @@ fn a_search_ends_on_any_readings_and_says_so() {
         };
         longest = longest.max(pieces);
         assert!(pieces < MOST_PIECES || answer.flags.has(Flags::MISFIT), "{answer:?}");
-        // It is not searched again at once.
+        // Who waits does not search it again at once.
         let next = solver.solve(&table, &Frame::of_volts(&read)).unwrap();
         assert!(!answer.flags.has(Flags::MISFIT) || next.work.looks == 0, "{next:?}");
     }
@@ -244,8 +247,8 @@ fn fit(contacts: usize, cost: f32, information: f32) -> Fit {
     Fit { scene, cost, objective: cost, information: [information; 3], ..Fit::NONE }
 }
 
-fn starts(gains: &[f32]) -> crate::scan::Candidates {
-    let mut all = NO_CANDIDATES;
+fn starts(gains: &[f32]) -> Candidates<f32> {
+    let mut all = no_candidates();
     all.iter_mut().zip(gains).for_each(|(one, gain)| *one = Candidate { spot: spot(0.02, 0.01, 1.0), gain: *gain });
     all
 }
@@ -362,7 +365,7 @@ fn one_more_is_looked_for_where_it_is_missing() {
         let errors = Errors::of(&frame, &table);
         let task = Task { table: &table, frame: &frame, errors: &errors };
         // The one that is there is fitted as well as it goes by itself.
-        let (mut circuit, mut fitting, mut looks) = (Circuit::EMPTY, Fitting::NONE, crate::Work::default());
+        let (mut circuit, mut fitting, mut looks) = (Circuit::EMPTY, Fitting::NONE, <crate::Work>::default());
         fitting.begin(Scene::EMPTY.with(there), ANY_RADIUS, 20);
         let alone = loop {
             let mut work = crate::fit::Working { done: &mut looks, attend: &mut || () };
@@ -372,7 +375,7 @@ fn one_more_is_looked_for_where_it_is_missing() {
         };
         assert!(circuit.solve(&table, alone.scene.spots()));
         let normal = fitting.normal;
-        let (mut done, mut best, mut from, mut pieces) = (crate::Work::default(), NO_CANDIDATES, Some(0), 0);
+        let (mut done, mut best, mut from, mut pieces) = (<crate::Work>::default(), no_candidates(), Some(0), 0);
         while let Some(at) = from {
             let mut work = crate::fit::Working { done: &mut done, attend: &mut || () };
             from = crate::beside::beside(task, &circuit, &normal, at, &mut best, &mut work);
@@ -384,7 +387,7 @@ fn one_more_is_looked_for_where_it_is_missing() {
         assert!(off_m < 0.007, "{found:?}");
         // By how much that would lower the sum of squares is what the normal equations say of the strength of one that is too light to change anything, with what the one
         // that is there could do as well.
-        let light = crate::circuit::Spot { ln_ohm: 16.0, ..found.spot };
+        let light = Spot { ln_ohm: 16.0, ..found.spot };
         let both = summed(&table, &frame, &[alone.scene.spots()[0], light], ANY_RADIUS);
         let pair = |a: usize, b: usize| f64::from(both.matrix[a.max(b)][a.min(b)]);
         let strength = PARAMETERS + 2;

@@ -1,5 +1,6 @@
 //! A frame of readings, and how far each may be from those of a model.
 
+use crate::real::Real;
 use crate::table::{MAX_ELECTRODES, Table};
 
 /// What a reading says.
@@ -18,9 +19,9 @@ pub enum Says {
 
 /// Readings of a frame, less the baseline: electrode `e` while `g` is grounded is at `g n + e`.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame<'f> {
+pub struct Frame<'f, T = f32> {
     /// Voltages (V).
-    pub(crate) volts: &'f [f32],
+    pub(crate) volts: &'f [T],
     /// What each says; empty where all are voltages.
     says: &'f [Says],
     /// Electrodes that are left out, a bit each, of how many.
@@ -53,21 +54,21 @@ pub enum FrameError {
     },
 }
 
-impl<'f> Frame<'f> {
+impl<'f, T: Real> Frame<'f, T> {
     /// A frame of voltages (V), with what each says.
-    pub fn new(volts: &'f [f32], says: &'f [Says]) -> Self {
+    pub fn new(volts: &'f [T], says: &'f [Says]) -> Self {
         Self { volts, says, left_out: 0, electrodes: 0 }
     }
 
     /// A frame whose readings are all voltages.
-    pub fn of_volts(volts: &'f [f32]) -> Self {
+    pub fn of_volts(volts: &'f [T]) -> Self {
         Self::new(volts, &[])
     }
 
     /// The frame without electrodes whose wires are broken, and which these are: while one is to be grounded, most others rise to the drive, for nothing is
     /// grounded. Where that is so of most electrodes, it is no electrode's fault.
     pub(crate) fn without_broken(self, table: &Table<'_>) -> (Self, u32) {
-        let (n, least_v) = (table.electrodes(), UNGROUNDED * table.head().drive_v);
+        let (n, least_v) = (table.electrodes(), T::of(UNGROUNDED) * T::of(table.head().drive_v));
         let is_broken = |g: usize| {
             let risen = (0..n).filter(|e| *e != g && self.touch_v(g * n + e) > least_v).count();
             4 * risen > 3 * (n - 1)
@@ -103,62 +104,62 @@ impl<'f> Frame<'f> {
     }
 
     /// What a reading is of a touch (V): nothing where it is below what the converter reads.
-    pub(crate) fn touch_v(&self, index: usize) -> f32 {
+    pub(crate) fn touch_v(&self, index: usize) -> T {
         match self.says_at(index) {
             Says::Voltage | Says::AtLeast => self.volts[index],
-            Says::AtMost | Says::Nothing => 0.0,
+            Says::AtMost | Says::Nothing => T::ZERO,
         }
     }
 }
 
 /// What is known of the errors of a frame.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Errors {
+pub(crate) struct Errors<T> {
     /// Variance of each reading by itself (V2).
-    pub variance_v2: f32,
+    pub variance_v2: T,
     /// Share of the readings' distance from the drive that an error of a grounded pad's own impedance changes.
-    pub pads: [f32; MAX_ELECTRODES],
+    pub pads: [T; MAX_ELECTRODES],
     /// Readings that count as voltages.
     pub count: usize,
     /// Whether any is at the upper end of the converter's range.
     pub is_full: bool,
 }
 
-impl Errors {
-    pub fn of(frame: &Frame<'_>, table: &Table<'_>) -> Self {
+impl<T: Real> Errors<T> {
+    pub fn of(frame: &Frame<'_, T>, table: &Table<'_>) -> Self {
         let (head, n) = (table.head(), table.electrodes());
         let mut errors = Self::default();
-        let mut largest_v: f32 = 0.0;
+        let mut largest_v: T = T::ZERO;
         for g in 0..n {
-            let mut largest_of_row_v: f32 = 0.0;
+            let mut largest_of_row_v: T = T::ZERO;
             for i in g * n..(g + 1) * n {
-                let is_full = frame.says_at(i) == Says::AtLeast || frame.touch_v(i) >= head.full_v;
+                let is_full = frame.says_at(i) == Says::AtLeast || frame.touch_v(i) >= T::of(head.full_v);
                 errors.is_full |= is_full;
                 errors.count += usize::from(frame.says_at(i) == Says::Voltage && !is_full);
                 largest_of_row_v = largest_of_row_v.max(frame.touch_v(i));
             }
-            errors.pads[g] = head.pad_share * largest_of_row_v / head.drive_v;
+            errors.pads[g] = T::of(head.pad_share) * largest_of_row_v / T::of(head.drive_v);
             largest_v = largest_v.max(largest_of_row_v);
         }
-        let model_v = head.model_share * largest_v;
-        errors.variance_v2 = head.noise_v * head.noise_v + model_v * model_v;
+        let model_v = T::of(head.model_share) * largest_v;
+        errors.variance_v2 = T::of(head.noise_v) * T::of(head.noise_v) + model_v * model_v;
         errors
     }
 
     /// What an error of a grounded pad's own impedance changes in a reading (V).
-    pub fn pad_v(&self, table: &Table<'_>, frame: &Frame<'_>, g: usize, e: usize) -> f32 {
-        let below_v = table.head().drive_v - frame.touch_v(g * table.electrodes() + e);
-        if e == g { 0.0 } else { self.pads[g] * below_v.max(0.0) }
+    pub fn pad_v(&self, table: &Table<'_>, frame: &Frame<'_, T>, g: usize, e: usize) -> T {
+        let below_v = T::of(table.head().drive_v) - frame.touch_v(g * table.electrodes() + e);
+        if e == g { T::ZERO } else { self.pads[g] * below_v.max(T::ZERO) }
     }
 }
 
 /// By how much a reading is more than a model's (V), of a bound by as much as that breaks it; `None` if it says nothing of that.
-pub(crate) fn left_v(frame: &Frame<'_>, index: usize, full_v: f32, predicted_v: f32) -> Option<f32> {
+pub(crate) fn left_v<T: Real>(frame: &Frame<'_, T>, index: usize, full_v: T, predicted_v: T) -> Option<T> {
     let left_v = frame.volts[index] - predicted_v;
     match frame.says_at(index) {
         Says::Voltage if frame.volts[index] < full_v => Some(left_v),
-        Says::AtMost if left_v < 0.0 => Some(left_v),
-        Says::AtLeast if left_v > 0.0 => Some(left_v),
+        Says::AtMost if left_v < T::ZERO => Some(left_v),
+        Says::AtLeast if left_v > T::ZERO => Some(left_v),
         _ => None,
     }
 }

@@ -2,6 +2,7 @@
 
 use core::f64::consts::PI;
 
+use crate::real::Real;
 use crate::table::{Floats, MOST, RADII, TableError};
 
 /// Numbers of a detector and its board.
@@ -68,17 +69,19 @@ impl Head {
     }
 
     /// Force under a contact (N) of a conductance with the constriction (S) by the law: `S = a F^g / (1 + a F^g R)`, solved for `F`.
-    pub(crate) fn force_n(&self, conductance_s: f32) -> f32 {
-        let most_s = self.force_s * libm::powf(self.force_most_n, self.force_exponent);
-        let held_s = conductance_s.max(0.0).min(most_s / (1.0 + most_s * self.force_ohm));
-        let own_s = held_s / (1.0 - held_s * self.force_ohm);
+    pub(crate) fn force_n<T: Real>(&self, conductance_s: T) -> T {
+        let [force_s, exponent, ohm, most_n] =
+            [self.force_s, self.force_exponent, self.force_ohm, self.force_most_n].map(T::of);
+        let most_s = force_s * most_n.powf(exponent);
+        let held_s = conductance_s.max(T::ZERO).min(most_s / (T::ONE + most_s * ohm));
+        let own_s = held_s / (T::ONE - held_s * ohm);
         // Rounding may take the last of it beyond.
-        libm::powf(own_s / self.force_s, 1.0 / self.force_exponent).min(self.force_most_n)
+        (own_s / force_s).powf(T::ONE / exponent).min(most_n)
     }
 
     /// Own field of a disc of even current on a deep layer (ohm).
-    pub(crate) fn even_ohm(&self, radius_m: f32) -> f32 {
-        EVEN_SPREADING as f32 / (self.top_s_per_m * radius_m)
+    pub(crate) fn even_ohm<T: Real>(&self, radius_m: T) -> T {
+        T::of(EVEN_SPREADING) / (T::of(self.top_s_per_m) * radius_m)
     }
 
     /// Its numbers in the order in which they are stored.

@@ -2,11 +2,11 @@
 
 use std::vec::Vec;
 
-use crate::circuit::{Circuit, Spot};
 use crate::frame::{Errors, left_v};
-use crate::normal::{ANY_RADIUS, MOST, Normal, PARAMETERS, USUAL_RADIUS};
+use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
 use crate::samples::{CELLS, field_ohm, fields_ohm, grid_m, table, table_of};
-use crate::tests::{spot, volts};
+use crate::tests::{Circuit, Normal, Spot, spot, volts};
+use crate::vector::PARAMETERS;
 use crate::{Frame, Says, Table};
 
 pub(crate) const ALL: [u8; (CELLS * CELLS).div_ceil(8)] = [255; (CELLS * CELLS).div_ceil(8)];
@@ -278,7 +278,7 @@ fn fields_are_those_of_the_sheet_and_their_derivatives_their_differences() {
         let [far, near] = [[0.03, 0.01], [0.006, 0.002]];
         assert!(((between(far) - between(near)) / (apart(far) - apart(near)) - 1.0).abs() < 0.2);
         let per_m = (table.by_distance_ohm(0.0101).0 - table.by_distance_ohm(0.0099).0) / 2e-4;
-        assert!((table.by_distance_ohm(0.01).1 / per_m - 1.0).abs() < 0.01);
+        assert!((table.by_distance_ohm(0.01f32).1 / per_m - 1.0).abs() < 0.01);
     }
 }
 
@@ -355,7 +355,7 @@ fn the_normal_matrix_is_how_the_sum_of_squares_bends() {
             for j in 0..normal.count {
                 let pair = |a: usize, b: usize| normal.matrix[a.max(b)][a.min(b)];
                 let scale = (normal.matrix[j][j] / normal.matrix[i][i]).sqrt();
-                let sum: f32 = (0..MOST).take(normal.count).map(|k| covariance[i][k] * pair(k, j)).sum();
+                let sum: f32 = (0..normal.count).map(|k| covariance[i][k] * pair(k, j)).sum();
                 assert!((sum - f32::from(u8::from(i == j))).abs() < 0.02 * scale.max(1.0), "{i} {j} {sum}");
             }
         }

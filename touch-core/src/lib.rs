@@ -34,6 +34,7 @@ mod head;
 #[cfg(test)]
 mod laws;
 mod normal;
+mod real;
 #[cfg(test)]
 mod samples;
 mod scan;
@@ -43,11 +44,12 @@ pub mod spline;
 pub mod table;
 #[cfg(test)]
 mod tests;
+mod vector;
 
 pub use self::answer::{Answer, Contact, Flags};
-pub use self::circuit::MAX_CONTACTS;
 pub use self::contents::Contents;
 pub use self::fit::Work;
 pub use self::frame::{Frame, FrameError, Says};
-pub use self::solver::{MOST_PIECES, Solver};
+pub use self::real::Real;
+pub use self::solver::{BOARD_CONTACTS, Solver};
 pub use self::table::{MAX_ELECTRODES, Table, TableError};

@@ -1,49 +1,38 @@
 //! Normal equations of contacts, summed up row by row of a frame, and steps by them.
 
-use crate::circuit::{Circuit, Loaded, MAX_CONTACTS, TURNED};
+use crate::circuit::{Circuit, Loaded, TURNED};
 use crate::frame::{Errors, Frame, Says, left_v};
+use crate::real::Real;
 use crate::table::{MAX_ELECTRODES, Table};
+use crate::vector::{Matrix, PARAMETERS, Vector};
 
-/// Parameters of a contact: its place along x and y in usual radii, the logarithm of its resistance, that of its radius.
-pub(crate) const PARAMETERS: usize = 4;
-/// Of them that of its resistance.
+/// Which parameter of a contact is that of its resistance.
 const STRENGTH: usize = 2;
-/// Of all contacts.
-pub(crate) const MOST: usize = PARAMETERS * MAX_CONTACTS;
 /// Standard deviation of the logarithm of a radius before anything is read: a factor of two.
 pub(crate) const ANY_RADIUS: f32 = 0.7;
 /// The same while the number of contacts is not known yet: too few would be made as wide as may be, and lead away from those that are missing.
 pub(crate) const USUAL_RADIUS: f32 = 0.15;
 
-/// A vector over parameters.
-pub(crate) type Vector = [f32; MOST];
-
 /// Sum of squares of what contacts leave of a frame, with its derivatives.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Normal {
+pub(crate) struct Normal<T, const K: usize> {
     /// How many parameters.
     pub count: usize,
     /// `J' W J`: lower triangle.
-    pub matrix: [Vector; MOST],
+    pub matrix: Matrix<T, K>,
     /// `J' W r`.
-    pub pull: Vector,
+    pub pull: Vector<T, K>,
     /// `r' W r`.
-    pub cost: f32,
+    pub cost: T,
     /// The same of what was known of radii before.
-    pub known: f32,
+    pub known: T,
     /// Diagonal of `J' W J` for each contact's strength by the readings that can speak for one: of a bound from above that it comes up to none does.
-    said: [f32; MAX_CONTACTS],
+    said: [T; K],
 }
 
-impl Normal {
-    pub const EMPTY: Self = Self {
-        count: 0,
-        matrix: [[0.0; MOST]; MOST],
-        pull: [0.0; MOST],
-        cost: 0.0,
-        known: 0.0,
-        said: [0.0; MAX_CONTACTS],
-    };
+impl<T: Real, const K: usize> Normal<T, K> {
+    pub const EMPTY: Self =
+        Self { count: 0, matrix: Matrix::ZERO, pull: Vector::ZERO, cost: T::ZERO, known: T::ZERO, said: [T::ZERO; K] };
 
     /// What contacts leave of a frame.
     ///
@@ -52,29 +41,29 @@ impl Normal {
     pub fn sum_up(
         &mut self,
         table: &Table<'_>,
-        circuit: &Circuit,
-        frame: &Frame<'_>,
-        errors: &Errors,
-        radius_deviation: f32,
+        circuit: &Circuit<T, K>,
+        frame: &Frame<'_, T>,
+        errors: &Errors<T>,
+        radius_deviation: T,
     ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         let (head, n) = (table.head(), table.electrodes());
-        let mut volts = [0.0; MAX_ELECTRODES];
+        let mut volts = [T::ZERO; MAX_ELECTRODES];
         for g in 0..n {
             circuit.row_v(table, g, &mut volts);
-            let (mut by_pad, mut left_by_pad, mut pad) = ([0.0; MOST], 0.0, 0.0);
-            let slopes = RowSlopes::new(circuit, g, head.drive_v, head.radius_m);
+            let (mut by_pad, mut left_by_pad, mut pad) = (Vector::<T, K>::ZERO, T::ZERO, T::ZERO);
+            let slopes = RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m));
             for e in 0..n {
                 let index = g * n + e;
-                let Some(left_v) = left_v(frame, index, head.full_v, volts[e]) else { continue };
-                let mut slope = [0.0; MOST];
+                let Some(left_v) = left_v(frame, index, T::of(head.full_v), volts[e]) else { continue };
+                let mut slope = Vector::<T, K>::ZERO;
                 for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-                    let pattern = Pattern::of(one, head.radius_m, |values| values[e]);
-                    slopes.add(circuit, k, &pattern, 1.0 - volts[e] / head.drive_v, &mut slope);
+                    let pattern = Pattern::of(one, T::of(head.radius_m), |values| values[e]);
+                    slopes.add(circuit, k, &pattern, T::ONE - volts[e] / T::of(head.drive_v), &mut slope);
                 }
                 if frame.says_at(index) != Says::AtMost {
                     let by_strength = slope.iter().skip(STRENGTH).step_by(PARAMETERS);
-                    self.said.iter_mut().zip(by_strength).for_each(|(said, slope)| *said += slope * slope);
+                    self.said.iter_mut().zip(by_strength).for_each(|(said, slope)| *said += *slope * *slope);
                 }
                 let by_pad_v = errors.pad_v(table, frame, g, e);
                 self.cost += left_v * left_v;
@@ -88,7 +77,7 @@ impl Normal {
                     }
                 }
             }
-            let less = 1.0 / (errors.variance_v2 + pad);
+            let less = T::ONE / (errors.variance_v2 + pad);
             self.cost -= less * left_by_pad * left_by_pad;
             for i in 0..self.count {
                 self.pull[i] -= less * by_pad[i] * left_by_pad;
@@ -97,11 +86,11 @@ impl Normal {
                 }
             }
         }
-        self.weigh(1.0 / errors.variance_v2);
+        self.weigh(T::ONE / errors.variance_v2);
         self.add_known(circuit, radius_deviation);
     }
 
-    fn weigh(&mut self, weight: f32) {
+    fn weigh(&mut self, weight: T) {
         self.cost *= weight;
         self.said.iter_mut().for_each(|said| *said *= weight);
         for i in 0..self.count {
@@ -110,8 +99,8 @@ impl Normal {
         }
     }
 
-    fn add_known(&mut self, circuit: &Circuit, radius_deviation: f32) {
-        let weight = 1.0 / (radius_deviation * radius_deviation);
+    fn add_known(&mut self, circuit: &Circuit<T, K>, radius_deviation: T) {
+        let weight = T::ONE / (radius_deviation * radius_deviation);
         for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
             let (i, ln_radius) = (PARAMETERS * k + 3, one.spot.ln_radius);
             self.matrix[i][i] += weight;
@@ -121,12 +110,12 @@ impl Normal {
     }
 
     /// What is to become least.
-    pub fn objective(&self) -> f32 {
+    pub fn objective(&self) -> T {
         self.cost + self.known
     }
 
     /// The step to the least sum of squares, damped, and by how much that falls in the linear theory; `None` where nothing is determined.
-    pub fn step(&self, damping: f32) -> Option<(Vector, f32)> {
+    pub fn step(&self, damping: T) -> Option<(Vector<T, K>, T)> {
         let factor = Factor::of(self, damping)?;
         let step = factor.solved(self.pull);
         let gain = (0..self.count).map(|i| step[i] * self.pull[i]).sum();
@@ -135,22 +124,22 @@ impl Normal {
 
     /// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that
     /// of the derivative by its logarithm, or what others leave of that.
-    pub fn information(&self) -> [f32; MAX_CONTACTS] {
+    pub fn information(&self) -> [T; K] {
         let covariance = self.covariance();
         core::array::from_fn(|k| {
             let strength = PARAMETERS * k + STRENGTH;
-            let left = covariance.as_ref().map_or(f32::INFINITY, |all| 1.0 / all[strength][strength]);
+            let left = covariance.as_ref().map_or(T::infinity(), |all| T::ONE / all[strength][strength]);
             self.matrix[strength][strength].min(left).min(self.said[k])
         })
     }
 
     /// Covariance of the parameters; `None` where they are not determined.
-    pub fn covariance(&self) -> Option<[Vector; MOST]> {
-        let factor = Factor::of(self, 1e-6)?;
-        let mut all = [[0.0; MOST]; MOST];
+    pub fn covariance(&self) -> Option<Matrix<T, K>> {
+        let factor = Factor::of(self, T::of(1e-6))?;
+        let mut all = Matrix::<T, K>::ZERO;
         for (i, column) in all.iter_mut().enumerate().take(self.count) {
-            let mut unit = [0.0; MOST];
-            unit[i] = 1.0;
+            let mut unit = Vector::<T, K>::ZERO;
+            unit[i] = T::ONE;
             *column = factor.solved(unit);
         }
         Some(all)
@@ -159,19 +148,20 @@ impl Normal {
 
 /// What the derivatives by a contact's parameters need of an electrode: numbers that are linear in the electrodes, so that a sum over these will do too.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pattern {
-    current: f32,
+pub(crate) struct Pattern<T> {
+    current: T,
     /// Changes of the field at the contact for a step of its place along x and along y, in usual radii, and of its radius' logarithm (ohm).
-    along: [f32; 3],
-    driving: [f32; 2],
-    turned: [f32; TURNED],
+    along: [T; 3],
+    driving: [T; 2],
+    turned: [T; TURNED],
 }
 
-impl Pattern {
-    pub const NONE: Self = Self { current: 0.0, along: [0.0; 3], driving: [0.0; 2], turned: [0.0; TURNED] };
+impl<T: Real> Pattern<T> {
+    pub const NONE: Self =
+        Self { current: T::ZERO, along: [T::ZERO; 3], driving: [T::ZERO; 2], turned: [T::ZERO; TURNED] };
 
     /// Of a contact, summed over electrodes by `sum`.
-    pub fn of(one: &Loaded, unit_m: f32, sum: impl Fn(&[f32]) -> f32) -> Self {
+    pub fn of(one: &Loaded<T>, unit_m: T, sum: impl Fn(&[T]) -> T) -> Self {
         let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| unit_m * sum(slopes));
         Self {
             current: sum(&one.currents),
@@ -182,7 +172,7 @@ impl Pattern {
     }
 
     /// Adds so much of another.
-    pub fn add(&mut self, share: f32, other: &Self) {
+    pub fn add(&mut self, share: T, other: &Self) {
         self.current += share * other.current;
         self.along.iter_mut().zip(other.along).for_each(|(sum, along)| *sum += share * along);
         self.driving.iter_mut().zip(other.driving).for_each(|(sum, driving)| *sum += share * driving);
@@ -190,11 +180,11 @@ impl Pattern {
     }
 
     /// Derivatives of the impedance between two electrodes by the parameters (ohm): linear in each of both.
-    pub fn changes_ohm(&self, other: &Self, one: &Loaded) -> [f32; PARAMETERS] {
-        let both = |a: f32, of_a: f32, b: f32, of_b: f32| a * of_b + b * of_a;
+    pub fn changes_ohm(&self, other: &Self, one: &Loaded<T>) -> [T; PARAMETERS] {
+        let both = |a: T, of_a: T, b: T, of_b: T| a * of_b + b * of_a;
         let moved = |p: usize| both(self.along[p], self.current, other.along[p], other.current);
         let turned = |t: usize, d: usize| both(self.turned[t], self.driving[d], other.turned[t], other.driving[d]);
-        let driven = 2.0 * (self.driving[0] * other.driving[0] + self.driving[1] * other.driving[1]);
+        let driven = T::of(2.0) * (self.driving[0] * other.driving[0] + self.driving[1] * other.driving[1]);
         let fields = [
             moved(0) + turned(0, 0) + turned(1, 1),
             moved(1) + turned(1, 0) + turned(2, 1),
@@ -209,31 +199,31 @@ impl Pattern {
 
 /// What the derivatives of a row's readings have in common.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RowSlopes {
+pub(crate) struct RowSlopes<T, const K: usize> {
     /// Volts by ohm.
-    pub per_ohm: f32,
+    pub per_ohm: T,
     /// Of each contact at the grounded electrode.
-    pub own: [Pattern; MAX_CONTACTS],
+    pub own: [Pattern<T>; K],
     /// Change of the load by each parameter (ohm).
-    pub own_ohm: Vector,
+    pub own_ohm: Vector<T, K>,
 }
 
-impl RowSlopes {
-    pub const NONE: Self = Self { per_ohm: 0.0, own: [Pattern::NONE; MAX_CONTACTS], own_ohm: [0.0; MOST] };
+impl<T: Real, const K: usize> RowSlopes<T, K> {
+    pub const NONE: Self = Self { per_ohm: T::ZERO, own: [Pattern::NONE; K], own_ohm: Vector::ZERO };
 
     /// Of the row of a grounded electrode; places are in `unit_m`.
-    pub fn new(circuit: &Circuit, g: usize, drive_v: f32, unit_m: f32) -> Self {
+    pub fn new(circuit: &Circuit<T, K>, g: usize, drive_v: T, unit_m: T) -> Self {
         let mut all = Self { per_ohm: -drive_v / circuit.loads_ohm[g], ..Self::NONE };
         for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
             all.own[k] = Pattern::of(one, unit_m, |values| values[g]);
             let changes_ohm = all.own[k].changes_ohm(&all.own[k], one);
-            all.own_ohm[PARAMETERS * k..PARAMETERS * (k + 1)].copy_from_slice(&changes_ohm);
+            all.own_ohm.0[k] = changes_ohm;
         }
         all
     }
 
     /// Adds the derivatives of a reading by the parameters of a contact, of which the electrode has `pattern`; `of_load` is what of the drive is not predicted at it.
-    fn add(&self, circuit: &Circuit, k: usize, pattern: &Pattern, of_load: f32, slope: &mut Vector) {
+    fn add(&self, circuit: &Circuit<T, K>, k: usize, pattern: &Pattern<T>, of_load: T, slope: &mut Vector<T, K>) {
         let first = PARAMETERS * k;
         let changes_ohm = pattern.changes_ohm(&self.own[k], &circuit.loaded[k]);
         for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
@@ -243,32 +233,32 @@ impl RowSlopes {
 }
 
 /// Cholesky factor of a damped normal matrix whose diagonal is scaled to one.
-pub(crate) struct Factor {
+pub(crate) struct Factor<T, const K: usize> {
     count: usize,
-    rows: [Vector; MOST],
-    scale: Vector,
+    rows: Matrix<T, K>,
+    scale: Vector<T, K>,
 }
 
-impl Factor {
+impl<T: Real, const K: usize> Factor<T, K> {
     /// Of a normal matrix; `None` where that is not positive definite.
-    pub fn of(normal: &Normal, damping: f32) -> Option<Self> {
+    pub fn of(normal: &Normal<T, K>, damping: T) -> Option<Self> {
         let count = normal.count;
-        let mut scale = [0.0; MOST];
+        let mut scale = Vector::<T, K>::ZERO;
         for i in 0..count {
             let own = normal.matrix[i][i];
-            if !(own > 0.0 && own.is_finite()) {
+            if !(own > T::ZERO && own.is_finite()) {
                 return None;
             }
-            scale[i] = 1.0 / libm::sqrtf(own);
+            scale[i] = T::ONE / own.sqrt();
         }
-        let mut rows = [[0.0; MOST]; MOST];
+        let mut rows = Matrix::<T, K>::ZERO;
         for i in 0..count {
             for j in 0..=i {
-                let own = if i == j { 1.0 + damping } else { normal.matrix[i][j] * scale[i] * scale[j] };
-                let sum: f32 = own - (0..j).map(|k| rows[i][k] * rows[j][k]).sum::<f32>();
+                let own = if i == j { T::ONE + damping } else { normal.matrix[i][j] * scale[i] * scale[j] };
+                let sum: T = own - (0..j).map(|k| rows[i][k] * rows[j][k]).sum::<T>();
                 rows[i][j] = match i == j {
                     // Below that, rounding has the say.
-                    true if sum > 1e-6 => libm::sqrtf(sum),
+                    true if sum > T::of(1e-6) => sum.sqrt(),
                     true => return None,
                     false => sum / rows[j][j],
                 };
@@ -278,22 +268,22 @@ impl Factor {
     }
 
     /// Square of a vector in the metric of the matrix's inverse.
-    pub fn square(&self, mut right: Vector) -> f32 {
+    pub fn square(&self, mut right: Vector<T, K>) -> T {
         self.forward(&mut right);
-        right.iter().take(self.count).map(|value| value * value).sum()
+        right.iter().take(self.count).map(|value| *value * *value).sum()
     }
 
-    fn forward(&self, right: &mut Vector) {
+    fn forward(&self, right: &mut Vector<T, K>) {
         for i in 0..self.count {
-            let sum: f32 = (0..i).map(|j| self.rows[i][j] * right[j]).sum();
+            let sum: T = (0..i).map(|j| self.rows[i][j] * right[j]).sum();
             right[i] = (right[i] * self.scale[i] - sum) / self.rows[i][i];
         }
     }
 
-    fn solved(&self, mut right: Vector) -> Vector {
+    fn solved(&self, mut right: Vector<T, K>) -> Vector<T, K> {
         self.forward(&mut right);
         for i in (0..self.count).rev() {
-            let sum: f32 = (i + 1..self.count).map(|j| self.rows[j][i] * right[j]).sum();
+            let sum: T = (i + 1..self.count).map(|j| self.rows[j][i] * right[j]).sum();
             right[i] = (right[i] - sum) / self.rows[i][i];
         }
         (0..self.count).for_each(|i| right[i] *= self.scale[i]);

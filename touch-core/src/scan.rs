@@ -7,6 +7,7 @@
 use crate::circuit::{PerElectrode, Spot};
 use crate::fit::{Working, held_ohm};
 use crate::frame::Frame;
+use crate::real::Real;
 use crate::solver::Task;
 use crate::table::{MAX_ELECTRODES, Table};
 
@@ -20,24 +21,30 @@ const LEAST_GAP: f32 = 1e-3;
 
 /// A place where a contact would explain some of a frame.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Candidate {
-    pub spot: Spot,
+pub(crate) struct Candidate<T> {
+    pub spot: Spot<T>,
     /// By how much it would lower the sum of squares, in the linear theory.
-    pub gain: f32,
+    pub gain: T,
 }
 
 /// The best candidates, the best first; those that are not there gain nothing.
-pub(crate) type Candidates = [Candidate; CANDIDATES];
+pub(crate) type Candidates<T> = [Candidate<T>; CANDIDATES];
+
+impl<T: Real> Candidate<T> {
+    /// One that is not there.
+    pub const NONE: Self = Self { spot: Spot::NONE, gain: T::ZERO };
+}
 
 /// None at all.
-pub(crate) const NO_CANDIDATES: Candidates =
-    [Candidate { spot: Spot { at_m: [0.0; 2], ln_ohm: 0.0, ln_radius: 0.0 }, gain: 0.0 }; CANDIDATES];
+pub(crate) const fn no_candidates<T: Real>() -> Candidates<T> {
+    [Candidate::NONE; CANDIDATES]
+}
 
 /// Takes a candidate among the best, unless a better one is near.
-pub(crate) fn take(all: &mut Candidates, new: Candidate, apart_m: f32) {
-    let is_near = |old: &Candidate| {
+pub(crate) fn take<T: Real>(all: &mut Candidates<T>, new: Candidate<T>, apart_m: T) {
+    let is_near = |old: &Candidate<T>| {
         let [x, y] = [0, 1].map(|d| old.spot.at_m[d] - new.spot.at_m[d]);
-        old.gain > 0.0 && x * x + y * y < apart_m * apart_m
+        old.gain > T::ZERO && x * x + y * y < apart_m * apart_m
     };
     let place = match all.iter().position(is_near) {
         Some(near) if all[near].gain >= new.gain => return,
@@ -67,17 +74,20 @@ pub(crate) fn places(table: &Table<'_>) -> impl Iterator<Item = (usize, usize)> 
 }
 
 /// Where one contact would explain most of a frame, where there is none yet. Counts the looks.
-pub(crate) fn first(Task { table, frame, errors }: Task<'_>, work: &mut Working<'_>) -> Candidates {
+pub(crate) fn first<T: Real, const K: usize>(
+    Task { table, frame, errors }: Task<'_, T>,
+    work: &mut Working<'_, K>,
+) -> Candidates<T> {
     let (head, n) = (table.head(), table.electrodes());
-    let scales = row_scales(frame, n, head.drive_v);
+    let scales = row_scales(frame, n, T::of(head.drive_v));
     // Scalar products with `u_e - u_g` for each electrode, and with the rest of the patterns.
-    let (mut of_fields, mut of_rest) = ([0.0; MAX_ELECTRODES], 0.0);
-    let (mut rest_of_fields, mut rest_square, mut mean_pad) = ([0.0; MAX_ELECTRODES], 0.0, 0.0);
+    let (mut of_fields, mut of_rest) = ([T::ZERO; MAX_ELECTRODES], T::ZERO);
+    let (mut rest_of_fields, mut rest_square, mut mean_pad) = ([T::ZERO; MAX_ELECTRODES], T::ZERO, T::ZERO);
     for g in 0..n {
-        mean_pad += (table.pads_ohm(g, g) + head.on_resistance_ohm) / n as f32;
+        mean_pad += (T::of(table.pads_ohm(g, g)) + T::of(head.on_resistance_ohm)) / T::of(n as u32);
         for e in 0..n {
             let volts = scales[g] * frame.touch_v(g * n + e);
-            let rest = table.pads_ohm(g, g) - table.pads_ohm(e, g) + head.on_resistance_ohm;
+            let rest = T::of(table.pads_ohm(g, g)) - T::of(table.pads_ohm(e, g)) + T::of(head.on_resistance_ohm);
             of_fields[e] += volts;
             of_fields[g] -= volts;
             of_rest += rest * volts;
@@ -86,8 +96,8 @@ pub(crate) fn first(Task { table, frame, errors }: Task<'_>, work: &mut Working<
             rest_square += rest * rest;
         }
     }
-    let mut all = Candidates::default();
-    let mut fields_ohm = [0.0; MAX_ELECTRODES];
+    let mut all = no_candidates();
+    let mut fields_ohm = [T::ZERO; MAX_ELECTRODES];
     for (i, j) in places(table) {
         let at_m = table.middle_m(i, j);
         if !table.holds(at_m[0], at_m[1]) {
@@ -95,33 +105,33 @@ pub(crate) fn first(Task { table, frame, errors }: Task<'_>, work: &mut Working<
         }
         work.looked_at_first();
         let own_ohm = table.rough(i, j, &mut fields_ohm);
-        let (mut along, mut square, mut squares, mut sum) = (of_rest, rest_square, 0.0, 0.0);
+        let (mut along, mut square, mut squares, mut sum) = (of_rest, rest_square, T::ZERO, T::ZERO);
         for e in 0..n {
             let field = fields_ohm[e];
             along += field * of_fields[e];
-            square += 2.0 * field * rest_of_fields[e];
+            square += T::of(2.0) * field * rest_of_fields[e];
             squares += field * field;
             sum += field;
         }
-        square += 2.0 * (n as f32 * squares - sum * sum);
-        if along > 0.0 && square > 0.0 {
-            let ohm = head.drive_v * square / along - (mean_pad - 2.0 * sum / n as f32);
-            let spot = Spot { at_m, ln_ohm: held_ohm(libm::logf(ohm.max(own_ohm)), table), ln_radius: 0.0 };
+        square += T::of(2.0) * (T::of(n as u32) * squares - sum * sum);
+        if along > T::ZERO && square > T::ZERO {
+            let ohm = T::of(head.drive_v) * square / along - (mean_pad - T::of(2.0) * sum / T::of(n as u32));
+            let spot = Spot { at_m, ln_ohm: held_ohm(ohm.max(own_ohm).ln(), table), ln_radius: T::ZERO };
             let gain = along * along / (square * errors.variance_v2);
-            take(&mut all, Candidate { spot, gain }, APART * head.radius_m);
+            take(&mut all, Candidate { spot, gain }, T::of(APART) * T::of(head.radius_m));
         }
     }
     all
 }
 
 /// The loads of all rows but for their geometric mean.
-fn row_scales(frame: &Frame<'_>, n: usize, drive_v: f32) -> PerElectrode {
-    let mut scales = [1.0; MAX_ELECTRODES];
-    let gap = |g: usize, e: usize| (1.0 - frame.touch_v(g * n + e) / drive_v).max(LEAST_GAP);
+fn row_scales<T: Real>(frame: &Frame<'_, T>, n: usize, drive_v: T) -> PerElectrode<T> {
+    let mut scales = [T::ONE; MAX_ELECTRODES];
+    let gap = |g: usize, e: usize| (T::ONE - frame.touch_v(g * n + e) / drive_v).max(T::of(LEAST_GAP));
     for (g, scale) in scales.iter_mut().enumerate().take(n) {
-        let product: f32 = (0..n).map(|e| gap(e, g) / gap(g, e)).product();
-        let root = libm::powf(product, 1.0 / n as f32);
-        *scale = if root.is_finite() { root } else { 1.0 };
+        let product: T = (0..n).map(|e| gap(e, g) / gap(g, e)).product();
+        let root = product.powf(T::ONE / T::of(n as u32));
+        *scale = if root.is_finite() { root } else { T::ONE };
     }
     scales
 }
@@ -147,7 +157,7 @@ mod tests {
             let read = volts(&table, &[truth]);
             let frame = Frame::of_volts(&read);
             let errors = Errors::of(&frame, &table);
-            let mut work = Work::default();
+            let mut work = <Work>::default();
             let mut working = Working { done: &mut work, attend: &mut || () };
             let [best, ..] = first(Task { table: &table, frame: &frame, errors: &errors }, &mut working);
             let scales = row_scales(&frame, 16, table.head().drive_v);

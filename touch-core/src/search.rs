@@ -1,10 +1,10 @@
 //! The search for what explains a frame: what is to be done next, and what becomes of what was found by that. The work itself is the [solver](crate::Solver)'s,
 //! who does it piece by piece.
 
-use crate::circuit::MAX_CONTACTS;
 use crate::fit::{Fit, Scene};
 use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
-use crate::scan::{CANDIDATES, Candidates, NO_CANDIDATES};
+use crate::real::Real;
+use crate::scan::{CANDIDATES, Candidates, no_candidates};
 
 /// Price of a parameter (squared deviations): that of the host's search.
 const PARAMETER_PRICE: f32 = 7.0;
@@ -24,15 +24,15 @@ const SEARCHING: u8 = 20;
 
 /// What a search needs done next.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Wants {
+pub(crate) enum Wants<T, const K: usize> {
     /// A scene fitted, with a standard deviation of the logarithms of radii, in so many steps at most.
-    Fit(Scene, f32, u8),
+    Fit(Scene<T, K>, T, u8),
     /// The places for a first contact in [`Search::starts`].
     First,
     /// The places for one more beside a scene, which is looked at with such a standard deviation, there.
-    Beside(Scene, f32),
+    Beside(Scene<T, K>, T),
     /// Nothing: this was found.
-    Nothing(Option<Fit>),
+    Nothing(Option<Fit<T, K>>),
 }
 
 /// What a search waits for.
@@ -69,19 +69,19 @@ enum Way {
 
 /// A search, of which one piece after the other is done.
 #[derive(Clone, Debug)]
-pub(crate) struct Search {
+pub(crate) struct Search<T, const K: usize> {
     awaits: Awaits,
     from: Way,
     /// What one more contact is looked for beside.
-    at: Fit,
+    at: Fit<T, K>,
     /// Best explanation by what was made from here on.
-    best: Option<Fit>,
+    best: Option<Fit<T, K>>,
     /// The best before that: by what was followed, or of all.
-    kept: Option<Fit>,
+    kept: Option<Fit<T, K>>,
     /// Best of some that are tried.
-    tried: Option<Fit>,
+    tried: Option<Fit<T, K>>,
     /// Where contacts may be.
-    pub starts: Candidates,
+    pub starts: Candidates<T>,
     /// Whether one more is looked for beside a whole explanation, with any radii.
     completes: bool,
     /// Whether what was found leaves enough for another contact, and whether it did before one was looked for anew.
@@ -92,7 +92,7 @@ pub(crate) struct Search {
     anew: u8,
 }
 
-impl Search {
+impl<T: Real, const K: usize> Search<T, K> {
     /// None under way.
     pub const NONE: Self = Self {
         awaits: Awaits::First,
@@ -101,7 +101,7 @@ impl Search {
         best: None,
         kept: None,
         tried: None,
-        starts: NO_CANDIDATES,
+        starts: no_candidates(),
         completes: false,
         more: false,
         more_before: false,
@@ -110,7 +110,7 @@ impl Search {
     };
 
     /// Looks for what explains a frame best, from what was followed, and from nothing; where one contact would explain most of it alone may be known.
-    pub fn begin(&mut self, followed: Option<Fit>, alone: Option<Candidates>, readings: f32) -> Wants {
+    pub fn begin(&mut self, followed: Option<Fit<T, K>>, alone: Option<Candidates<T>>, readings: T) -> Wants<T, K> {
         (self.best, self.kept, self.tried) = (None, None, None);
         self.from = Way::Followed;
         match (followed, alone) {
@@ -125,17 +125,17 @@ impl Search {
     }
 
     /// The best so far, where a search is to end early.
-    pub fn best_so_far(&self) -> Option<Fit> {
+    pub fn best_so_far(&self) -> Option<Fit<T, K>> {
         let at = Some(self.at).filter(|at| at.scene.count > 0);
         better(self.kept, self.best).or(self.tried).or(at)
     }
 
     /// Takes the fit that it waited for.
-    pub fn fitted(&mut self, found: Option<Fit>, readings: f32) -> Wants {
+    pub fn fitted(&mut self, found: Option<Fit<T, K>>, readings: T) -> Wants<T, K> {
         match self.awaits {
             Awaits::Grown => {
                 self.best = better(self.best, found);
-                if self.at.scene.count == MAX_CONTACTS {
+                if self.at.scene.count == K {
                     return self.grown(readings);
                 }
                 self.awaits = Awaits::More;
@@ -145,7 +145,7 @@ impl Search {
                 self.tried = better(self.tried, found);
                 let next = usize::from(number) + 1;
                 let fits = self.tried.is_some_and(|tried| !is_misfit(&tried, readings));
-                if !fits && self.starts.get(next).is_some_and(|start| start.gain > 0.0) {
+                if !fits && self.starts.get(next).is_some_and(|start| start.gain > T::ZERO) {
                     return self.start(next);
                 }
                 let Some(tried) = self.tried else { return self.added(None, readings) };
@@ -170,51 +170,51 @@ impl Search {
     }
 
     /// Takes the places that it waited for.
-    pub fn placed(&mut self, readings: f32) -> Wants {
+    pub fn placed(&mut self, readings: T) -> Wants<T, K> {
         let gain = self.starts[0].gain;
         match self.awaits {
-            Awaits::More if gain <= PAID * PARAMETER_PRICE => {
+            Awaits::More if gain <= T::of(PAID * PARAMETER_PRICE) => {
                 // With any radii they leave still less.
                 let count = self.at.scene.count;
                 self.best = self.best.map(|best| Fit { is_alone: best.scene.count == count, ..best });
                 self.grown(readings)
             }
-            Awaits::More => self.start_above(PAID * PARAMETER_PRICE, false),
-            Awaits::First if gain < FIRST_GAIN => {
+            Awaits::More => self.start_above(T::of(PAID * PARAMETER_PRICE), false),
+            Awaits::First if gain < T::of(FIRST_GAIN) => {
                 self.best = self.kept;
                 self.prune(readings)
             }
             Awaits::First => {
                 (self.at, self.best) = (Fit::NONE, None);
-                self.start_above(0.0, false)
+                self.start_above(T::ZERO, false)
             }
             Awaits::Another => {
-                self.more = gain > FIRST_GAIN;
-                let is_full = self.best.is_some_and(|best| best.scene.count == MAX_CONTACTS);
-                if self.more && !is_full { self.start_above(FIRST_GAIN, true) } else { self.completed(readings) }
+                self.more = gain > T::of(FIRST_GAIN);
+                let is_full = self.best.is_some_and(|best| best.scene.count == K);
+                if self.more && !is_full { self.start_above(T::of(FIRST_GAIN), true) } else { self.completed(readings) }
             }
             _ => Wants::Nothing(self.best_so_far()),
         }
     }
 
-    fn begin_from_nothing(&mut self) -> Wants {
+    fn begin_from_nothing(&mut self) -> Wants<T, K> {
         (self.from, self.awaits) = (Way::Nothing, Awaits::First);
         Wants::First
     }
 
     /// Looks for the likeliest number of contacts from some that are found on, one more at a time.
-    fn grow(&mut self, from: Fit) -> Wants {
+    fn grow(&mut self, from: Fit<T, K>) -> Wants<T, K> {
         self.best = None;
         self.grow_on(from)
     }
 
-    fn grow_on(&mut self, at: Fit) -> Wants {
+    fn grow_on(&mut self, at: Fit<T, K>) -> Wants<T, K> {
         (self.at, self.awaits) = (at, Awaits::Grown);
-        Wants::Fit(at.scene, ANY_RADIUS, SEARCHING)
+        Wants::Fit(at.scene, T::of(ANY_RADIUS), SEARCHING)
     }
 
     /// No more contacts are worth their price.
-    fn grown(&mut self, readings: f32) -> Wants {
+    fn grown(&mut self, readings: T) -> Wants<T, K> {
         match self.from {
             Way::Followed => {
                 // What there was more than is no place to go on from.
@@ -233,13 +233,13 @@ impl Search {
     }
 
     /// Tries one more contact at the places where it gains more than this.
-    fn start_above(&mut self, least_gain: f32, completes: bool) -> Wants {
-        self.starts.iter_mut().filter(|start| start.gain <= least_gain).for_each(|start| start.gain = 0.0);
+    fn start_above(&mut self, least_gain: T, completes: bool) -> Wants<T, K> {
+        self.starts.iter_mut().filter(|start| start.gain <= least_gain).for_each(|start| start.gain = T::ZERO);
         (self.completes, self.tried) = (completes, None);
         self.start(0)
     }
 
-    fn start(&mut self, number: usize) -> Wants {
+    fn start(&mut self, number: usize) -> Wants<T, K> {
         const { assert!(CANDIDATES <= u8::MAX as usize) };
         self.awaits = Awaits::Start(number as u8);
         let others = if self.completes { self.best.unwrap_or(Fit::NONE) } else { self.at };
@@ -247,19 +247,19 @@ impl Search {
         Wants::Fit(scene, self.radius_deviation(), TRYING)
     }
 
-    fn radius_deviation(&self) -> f32 {
-        if self.completes { ANY_RADIUS } else { USUAL_RADIUS }
+    fn radius_deviation(&self) -> T {
+        if self.completes { T::of(ANY_RADIUS) } else { T::of(USUAL_RADIUS) }
     }
 
     /// One more contact was found, or none.
-    fn added(&mut self, found: Option<Fit>, readings: f32) -> Wants {
+    fn added(&mut self, found: Option<Fit<T, K>>, readings: T) -> Wants<T, K> {
         if !self.completes {
             return match found {
                 Some(more) => self.grow_on(more),
                 None => self.grown(readings),
             };
         }
-        let is_better = |new: &Fit| self.best.is_none_or(|best| score(new) < score(&best));
+        let is_better = |new: &Fit<T, K>| self.best.is_none_or(|best| score(new) < score(&best));
         match found.filter(is_better) {
             Some(new) => {
                 self.best = Some(new);
@@ -270,27 +270,27 @@ impl Search {
     }
 
     /// Leaves out the contacts that the readings do not speak for.
-    fn prune(&mut self, readings: f32) -> Wants {
+    fn prune(&mut self, readings: T) -> Wants<T, K> {
         match self.best {
             None if self.from == Way::Rest => self.exchanged(readings),
             None => self.nothing_found(),
             Some(best) => match weakest(&best) {
                 Some(gone) => {
                     self.awaits = Awaits::Pruned;
-                    Wants::Fit(best.scene.without(gone), ANY_RADIUS, SEARCHING)
+                    Wants::Fit(best.scene.without(gone), T::of(ANY_RADIUS), SEARCHING)
                 }
                 None => self.complete(readings),
             },
         }
     }
 
-    fn nothing_found(&mut self) -> Wants {
+    fn nothing_found(&mut self) -> Wants<T, K> {
         self.more = false;
         Wants::Nothing(None)
     }
 
     /// Looks for one more contact beside an explanation, as long as that would explain much of what they leave; notes whether another one would.
-    fn complete(&mut self, readings: f32) -> Wants {
+    fn complete(&mut self, readings: T) -> Wants<T, K> {
         match self.best {
             Some(best) if !best.is_alone => {
                 self.awaits = Awaits::Another;
@@ -303,7 +303,7 @@ impl Search {
         }
     }
 
-    fn completed(&mut self, readings: f32) -> Wants {
+    fn completed(&mut self, readings: T) -> Wants<T, K> {
         if self.from == Way::Rest {
             return self.exchanged(readings);
         }
@@ -314,7 +314,7 @@ impl Search {
 
     /// Looks for one contact of an explanation that leaves too much anew beside the others: one that went astray early is held there by those that came after it.
     /// As often as there are contacts at most; and where there are more than can be told, it is not for the search that they leave too much.
-    fn exchange(&mut self, readings: f32) -> Wants {
+    fn exchange(&mut self, readings: T) -> Wants<T, K> {
         let Some(kept) = self.kept else { return self.nothing_found() };
         let count = kept.scene.count;
         if usize::from(self.anew) >= count || !self.is_to_be_mended(&kept, readings) {
@@ -323,11 +323,12 @@ impl Search {
         let contact = usize::from(self.contact) % count;
         (self.contact, self.anew) = (contact as u8, self.anew + 1);
         (self.more_before, self.awaits, self.best) = (self.more, Awaits::Rest, None);
-        Wants::Fit(kept.scene.without(contact), USUAL_RADIUS, SEARCHING)
+        Wants::Fit(kept.scene.without(contact), T::of(USUAL_RADIUS), SEARCHING)
     }
 
-    fn exchanged(&mut self, readings: f32) -> Wants {
-        let is_better = |new: &Fit| self.kept.is_none_or(|kept| score(new) < score(&kept) - PARAMETER_PRICE);
+    fn exchanged(&mut self, readings: T) -> Wants<T, K> {
+        let is_better =
+            |new: &Fit<T, K>| self.kept.is_none_or(|kept| score(new) < score(&kept) - T::of(PARAMETER_PRICE));
         match self.best.filter(is_better) {
             Some(new) => self.kept = Some(new),
             None => (self.contact, self.more) = (self.contact + 1, self.more_before),
@@ -335,23 +336,23 @@ impl Search {
         self.exchange(readings)
     }
 
-    fn is_to_be_mended(&self, fit: &Fit, readings: f32) -> bool {
-        let is_beyond = self.more && fit.scene.count == MAX_CONTACTS;
+    fn is_to_be_mended(&self, fit: &Fit<T, K>, readings: T) -> bool {
+        let is_beyond = self.more && fit.scene.count == K;
         !is_beyond && (self.more || is_misfit(fit, readings))
     }
 
     /// Leaves out each contact after this one, if there is one, that the others may do as well without, once they are fitted anew: a second one that was found while
     /// the first was too small. Then the explanation is the one with fewer that is better, if one is, and is looked through again.
-    fn leave_out_after(&mut self, contact: Option<u8>) -> Wants {
+    fn leave_out_after(&mut self, contact: Option<u8>) -> Wants<T, K> {
         let Some(kept) = self.kept else { return self.nothing_found() };
         if contact.is_none() {
             self.tried = None;
         }
         let next = contact.map_or(0, |contact| usize::from(contact) + 1);
-        let is_unsure = |k: &usize| kept.scene.count > 1 && kept.information[*k] < SURE;
+        let is_unsure = |k: &usize| kept.scene.count > 1 && kept.information[*k] < T::of(SURE);
         if let Some(next) = (next..kept.scene.count).find(is_unsure) {
             self.awaits = Awaits::Fewer(next as u8);
-            return Wants::Fit(kept.scene.without(next), ANY_RADIUS, SEARCHING);
+            return Wants::Fit(kept.scene.without(next), T::of(ANY_RADIUS), SEARCHING);
         }
         match self.tried.filter(|fewer| score(fewer) < score(&kept)) {
             Some(fewer) => {
@@ -363,26 +364,26 @@ impl Search {
     }
 }
 
-pub(crate) fn freedom(fit: &Fit) -> f32 {
-    PAID * fit.scene.count as f32
+pub(crate) fn freedom<T: Real, const K: usize>(fit: &Fit<T, K>) -> T {
+    T::of(PAID) * T::of(fit.scene.count as u32)
 }
 
 /// Sum of squares of so many normal numbers beyond which they are not those of noise.
-pub(crate) fn limit(freedom: f32) -> f32 {
-    let freedom = freedom.max(1.0);
-    freedom + MISFIT_DEVIATIONS * libm::sqrtf(2.0 * freedom)
+pub(crate) fn limit<T: Real>(freedom: T) -> T {
+    let freedom = freedom.max(T::ONE);
+    freedom + T::of(MISFIT_DEVIATIONS) * (T::of(2.0) * freedom).sqrt()
 }
 
-pub(crate) fn is_misfit(fit: &Fit, readings: f32) -> bool {
+pub(crate) fn is_misfit<T: Real, const K: usize>(fit: &Fit<T, K>, readings: T) -> bool {
     fit.cost > limit(readings - freedom(fit))
 }
 
 /// The sum of squares with the price of contacts: of two explanations the lower one is believed.
-fn score(fit: &Fit) -> f32 {
-    fit.objective + PARAMETER_PRICE * PAID * fit.scene.count as f32
+fn score<T: Real, const K: usize>(fit: &Fit<T, K>) -> T {
+    fit.objective + T::of(PARAMETER_PRICE * PAID) * T::of(fit.scene.count as u32)
 }
 
-fn better(a: Option<Fit>, b: Option<Fit>) -> Option<Fit> {
+fn better<T: Real, const K: usize>(a: Option<Fit<T, K>>, b: Option<Fit<T, K>>) -> Option<Fit<T, K>> {
     match (a, b) {
         (Some(a), Some(b)) => Some(if score(&b) < score(&a) { b } else { a }),
         (a, b) => a.or(b),
@@ -390,8 +391,8 @@ fn better(a: Option<Fit>, b: Option<Fit>) -> Option<Fit> {
 }
 
 /// The contact that the readings speak least for, if that is less than its price.
-pub(crate) fn weakest(fit: &Fit) -> Option<usize> {
+pub(crate) fn weakest<T: Real, const K: usize>(fit: &Fit<T, K>) -> Option<usize> {
     let all = &fit.information;
     let least = (0..fit.scene.count).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
-    (all[least] < PAID * PARAMETER_PRICE).then_some(least)
+    (all[least] < T::of(PAID * PARAMETER_PRICE)).then_some(least)
 }

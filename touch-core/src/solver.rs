@@ -1,24 +1,25 @@
 //! Contacts from frame to frame.
 //!
-//! What was found last is fitted again. Where that explains neither a frame nor the one before, more contacts are looked for beside it, and without it. One
-//! more is believed if it lowers the sum of squares by more than its parameters' price. What leaves too much is mended: one more where that would explain much,
+//! What was found last is fitted again. Where that does not explain a frame (of a [patient](Solver::patient) solver: nor the one before), more contacts are looked
+//! for beside it, and without it. One more is believed if it lowers the sum of squares by more than its parameters' price. What leaves too much is mended: one more where that would explain much,
 //! each in turn looked for anew beside the others, and one fewer where those that stay do as well.
 //!
 //! All that is done in pieces, each of which ends soon, so that whoever has something else to do between them can.
 
 use crate::answer::{Answer, Contact, Flags};
 use crate::beside::beside;
-use crate::circuit::{Circuit, MAX_CONTACTS};
+use crate::circuit::Circuit;
 use crate::fit::{Fit, Fitting, LN_RADII, LN_SQUARES, Scene, Went, Work, Working};
 use crate::frame::{Errors, Frame, FrameError, Says};
-use crate::normal::{ANY_RADIUS, MOST, PARAMETERS, Vector};
-use crate::scan::{NO_CANDIDATES, first};
+use crate::normal::ANY_RADIUS;
+use crate::real::Real;
+use crate::scan::{first, no_candidates};
 use crate::search::{FIRST_GAIN, Search, Wants, freedom, is_misfit, limit, weakest};
 use crate::table::Table;
+use crate::vector::{Matrix, PARAMETERS};
 
-/// Pieces of work that a search takes at most; one that is not done by then ends with the best that it has, and [misfit](Flags::MISFIT) is raised. Of 2400 frames of
-/// none to six contacts on a made-up sheet, searches that explain what three or fewer left took up to 300, those of random readings up to 1400. Five contacts on `square-60` take more than 400 and fewer than 600.
-pub const MOST_PIECES: u32 = 600;
+/// Most contacts that a board looks for.
+pub const BOARD_CONTACTS: usize = 3;
 /// What is followed explains a frame as long as its sum of squares is below this times what the search left: the host's.
 const WORSE: f32 = 1.3;
 /// Steps at most where contacts are followed, and where one that is gone is left out.
@@ -36,15 +37,15 @@ const UNFINISHED: f32 = 1.0;
 
 /// A frame to be explained.
 #[derive(Clone, Copy)]
-pub(crate) struct Task<'a> {
+pub(crate) struct Task<'a, T> {
     pub table: &'a Table<'a>,
-    pub frame: &'a Frame<'a>,
-    pub errors: &'a Errors,
+    pub frame: &'a Frame<'a, T>,
+    pub errors: &'a Errors<T>,
 }
 
-impl Task<'_> {
-    pub fn readings(&self) -> f32 {
-        self.errors.count as f32
+impl<T: Real> Task<'_, T> {
+    pub fn readings(&self) -> T {
+        T::of(self.errors.count as u32)
     }
 }
 
@@ -77,64 +78,86 @@ enum Piece {
 
 /// Finds contacts in frames, one after the other: those of one table.
 #[derive(Clone, Debug)]
-pub struct Solver {
-    circuit: Circuit,
-    fitting: Fitting,
-    search: Search,
+pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS> {
+    circuit: Circuit<T, K>,
+    fitting: Fitting<T, K>,
+    search: Search<T, K>,
     stage: Stage,
     piece: Piece,
     /// Work on this frame so far; pieces of a search.
-    work: Work,
+    work: Work<K>,
     pieces: u32,
-    scene: Scene,
-    ids: [u32; MAX_CONTACTS],
+    scene: Scene<T, K>,
+    ids: [u32; K],
     /// Numbers begin at 1.
     next_id: u32,
     /// What the last search left of a reading, and the frames that one that did not end well is not repeated for.
-    searched: f32,
+    searched: T,
     patience: u32,
     wait: u32,
     /// Whether the last frame was not explained by what was followed, or there was none.
     was_lost: bool,
+    /// Whether one is waited for that is not explained either.
+    is_patient: bool,
 }
 
-impl Default for Solver {
+impl<T: Real, const K: usize> Default for Solver<T, K> {
     fn default() -> Self {
-        Self::new()
+        Self::blank(false)
     }
 }
 
 impl Solver {
-    /// A solver that has seen nothing.
+    /// A solver that has seen nothing, in the numbers and for the contacts of a board; one of others is [`Solver::default`]. Each frame is answered by itself.
     pub const fn new() -> Self {
+        Self::blank(false)
+    }
+}
+
+impl<T: Real, const K: usize> Solver<T, K> {
+    /// Pieces of work that a search takes at most; one that is not done by then ends with the best that it has, and [misfit](Flags::MISFIT) is raised. They grow with
+    /// the contacts that are tried one after the other, and with those of each try: about as the square of their most.
+    ///
+    /// On a board it is 600. Of 2400 frames of none to six contacts on a made-up sheet, searches that explain what three or fewer left took up to 300, those of random
+    /// readings up to 1400. Five contacts on `square-60` take more than 400 and fewer than 600.
+    pub const MOST_PIECES: u32 = (600 * K * K / (BOARD_CONTACTS * BOARD_CONTACTS)) as u32;
+
+    /// One that waits, for frames whose rows are read one after the other: while something lands or lifts, these are not rows of one scene. A frame that what is
+    /// followed does not explain is flagged, keeps the contacts of the one before, and is searched only if the next one is not explained either.
+    pub const fn patient() -> Self {
+        Self::blank(true)
+    }
+
+    const fn blank(is_patient: bool) -> Self {
         Self {
             circuit: Circuit::EMPTY,
             fitting: Fitting::NONE,
             search: Search::NONE,
             stage: Stage::Idle,
             piece: Piece::Fit,
-            work: Work { frames: [0; MAX_CONTACTS], first_looks: 0, looks: 0 },
+            work: Work::NONE,
             pieces: 0,
             scene: Scene::EMPTY,
-            ids: [0; MAX_CONTACTS],
+            ids: [0; K],
             next_id: 1,
-            searched: 0.0,
+            searched: T::ZERO,
             patience: PATIENCE[0],
             wait: 0,
             was_lost: true,
+            is_patient,
         }
     }
 
     /// Forgets the frames before.
     pub fn reset(&mut self) {
-        *self = Self::new();
+        *self = Self::blank(self.is_patient);
     }
 
     /// The contacts of a frame.
     ///
     /// # Errors
     /// [`FrameError`] if it cannot be a frame of the table's detector.
-    pub fn solve(&mut self, table: &Table<'_>, frame: &Frame<'_>) -> Result<Answer, FrameError> {
+    pub fn solve(&mut self, table: &Table<'_>, frame: &Frame<'_, T>) -> Result<Answer<T, K>, FrameError> {
         self.stage = Stage::Idle;
         loop {
             if let Some(answer) = self.solve_in_pieces(table, frame, u32::MAX, &mut || {})? {
@@ -151,23 +174,23 @@ impl Solver {
     /// Does so many pieces of the work on a frame, or fewer if it is done with fewer; the contacts once it is done. It is to be called with the same frame until then.
     ///
     /// No piece takes longer than two looks at three contacts, some 300 000 floating-point operations. A frame whose contacts are followed takes two to five, and
-    /// a search [`MOST_PIECES`] at most. During a piece `attend` is called after each look at contacts or at a place, for who has something else to attend to.
+    /// a search [`MOST_PIECES`](Self::MOST_PIECES) at most. During a piece `attend` is called after each look at contacts or at a place, for who has something else to attend to.
     ///
     /// # Errors
     /// [`FrameError`] if it cannot be a frame of the table's detector.
     pub fn solve_in_pieces(
         &mut self,
         table: &Table<'_>,
-        frame: &Frame<'_>,
+        frame: &Frame<'_, T>,
         pieces: u32,
         attend: &mut dyn FnMut(),
-    ) -> Result<Option<Answer>, FrameError> {
+    ) -> Result<Option<Answer<T, K>>, FrameError> {
         frame.check(table)?;
         let (frame, left_out) = frame.without_broken(table);
         let task = Task { table, frame: &frame, errors: &Errors::of(&frame, table) };
         if self.stage == Stage::Idle {
-            (self.stage, self.work) = (Stage::Followed, Work::default());
-            self.fit(self.scene, ANY_RADIUS, FOLLOWING);
+            (self.stage, self.work) = (Stage::Followed, Work::NONE);
+            self.fit(self.scene, T::of(ANY_RADIUS), FOLLOWING);
         }
         let answer = (0..pieces).find_map(|_| self.go_on(task, attend));
         Ok(answer.map(|mut answer| {
@@ -178,7 +201,7 @@ impl Solver {
     }
 
     /// Does a piece of work.
-    fn go_on(&mut self, task: Task<'_>, attend: &mut dyn FnMut()) -> Option<Answer> {
+    fn go_on(&mut self, task: Task<'_, T>, attend: &mut dyn FnMut()) -> Option<Answer<T, K>> {
         let readings = task.readings();
         let mut work = Working { done: &mut self.work, attend };
         let wants = match self.piece {
@@ -212,7 +235,7 @@ impl Solver {
         };
         if self.stage == Stage::Searched {
             self.pieces += 1;
-            if self.pieces >= MOST_PIECES {
+            if self.pieces >= Self::MOST_PIECES {
                 return self.found(self.search.best_so_far(), task);
             }
         }
@@ -220,29 +243,34 @@ impl Solver {
     }
 
     /// Prepares what a search wants done.
-    fn prepare(&mut self, wants: Wants, task: Task<'_>) -> Option<Answer> {
+    fn prepare(&mut self, wants: Wants<T, K>, task: Task<'_, T>) -> Option<Answer<T, K>> {
         match wants {
             Wants::Fit(scene, radius_deviation, steps) => self.fit(scene, radius_deviation, steps),
             Wants::First => self.piece = Piece::First,
             Wants::Beside(scene, radius_deviation) => {
                 self.fit(scene, radius_deviation, 0);
-                (self.search.starts, self.piece) = (NO_CANDIDATES, Piece::Others);
+                (self.search.starts, self.piece) = (no_candidates(), Piece::Others);
             }
             Wants::Nothing(found) => return self.found(found, task),
         }
         None
     }
 
-    fn fit(&mut self, scene: Scene, radius_deviation: f32, steps: u8) {
+    fn fit(&mut self, scene: Scene<T, K>, radius_deviation: T, steps: u8) {
         self.fitting.begin(scene, radius_deviation, steps);
         self.piece = Piece::Fit;
     }
 
     /// Takes a fit that is none of a search.
-    fn fitted(&mut self, found: Option<Fit>, task: Task<'_>, attend: &mut dyn FnMut()) -> Option<Answer> {
+    fn fitted(
+        &mut self,
+        found: Option<Fit<T, K>>,
+        task: Task<'_, T>,
+        attend: &mut dyn FnMut(),
+    ) -> Option<Answer<T, K>> {
         match (self.stage, found.and_then(|fit| Some((fit, weakest(&fit)?)))) {
             (Stage::Followed, Some((fit, gone))) => {
-                self.fit(fit.scene.without(gone), ANY_RADIUS, LEAVING_OUT);
+                self.fit(fit.scene.without(gone), T::of(ANY_RADIUS), LEAVING_OUT);
                 None
             }
             (Stage::Followed, None) => self.followed(found, task, attend),
@@ -251,21 +279,27 @@ impl Solver {
     }
 
     /// Decides what becomes of a frame by what was followed in it.
-    fn followed(&mut self, found: Option<Fit>, task: Task<'_>, attend: &mut dyn FnMut()) -> Option<Answer> {
+    fn followed(
+        &mut self,
+        found: Option<Fit<T, K>>,
+        task: Task<'_, T>,
+        attend: &mut dyn FnMut(),
+    ) -> Option<Answer<T, K>> {
         let readings = task.readings();
         // Nothing is left, or far less unexplained: what did not fit is gone.
-        let has_changed = found.is_none_or(|fit| self.search.more && WORSE * fit.cost < self.searched);
+        let has_changed = found.is_none_or(|fit| self.search.more && T::of(WORSE) * fit.cost < self.searched);
         if has_changed {
             self.wait = 0;
         }
-        let most = |fit: &Fit| (WORSE * self.searched).max(limit(readings - freedom(fit)));
+        let most = |fit: &Fit<T, K>| (T::of(WORSE) * self.searched).max(limit(readings - freedom(fit)));
         let alone = found.is_none().then(|| first(task, &mut Working { done: &mut self.work, attend }));
         let is_lost = match (&found, &alone) {
             (Some(fit), _) => has_changed || fit.cost > most(fit),
-            (None, alone) => alone.is_some_and(|alone| alone[0].gain >= FIRST_GAIN),
+            (None, alone) => alone.is_some_and(|alone| alone[0].gain >= T::of(FIRST_GAIN)),
         };
         self.search.more &= found.is_some();
-        if is_lost && self.was_lost && self.may_search() {
+        let may_search = !self.is_patient || self.was_lost && self.may_search();
+        if is_lost && may_search {
             (self.stage, self.pieces) = (Stage::Searched, 0);
             let wants = self.search.begin(found, alone, readings);
             return self.prepare(wants, task);
@@ -273,7 +307,7 @@ impl Solver {
         if is_lost && !self.was_lost {
             // While something lands or lifts, rows are not those of one scene: what there was stays, and the next frame tells.
             self.stage = Stage::Kept;
-            self.fit(self.scene, ANY_RADIUS, 0);
+            self.fit(self.scene, T::of(ANY_RADIUS), 0);
             return None;
         }
         Some(self.end(found, is_lost, task))
@@ -286,16 +320,16 @@ impl Solver {
     }
 
     /// Takes what a search has found; notes how well it explains the frame. One that was not ended did not end well.
-    fn found(&mut self, found: Option<Fit>, task: Task<'_>) -> Option<Answer> {
+    fn found(&mut self, found: Option<Fit<T, K>>, task: Task<'_, T>) -> Option<Answer<T, K>> {
         self.search.more &= found.is_some();
-        self.searched = found.map_or(0.0, |fit| fit.cost);
-        let fits = self.pieces < MOST_PIECES && found.is_none_or(|fit| !is_misfit(&fit, task.readings()));
+        self.searched = found.map_or(T::ZERO, |fit| fit.cost);
+        let fits = self.pieces < Self::MOST_PIECES && found.is_none_or(|fit| !is_misfit(&fit, task.readings()));
         self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
         self.wait = if fits { 0 } else { self.patience };
         self.stage = Stage::Found;
         match found {
             Some(fit) => {
-                self.fit(fit.scene, ANY_RADIUS, 0);
+                self.fit(fit.scene, T::of(ANY_RADIUS), 0);
                 None
             }
             None => Some(self.end(None, false, task)),
@@ -303,7 +337,7 @@ impl Solver {
     }
 
     /// The answer, with what is the last fit if there is one.
-    fn end(&mut self, found: Option<Fit>, is_lost: bool, task: Task<'_>) -> Answer {
+    fn end(&mut self, found: Option<Fit<T, K>>, is_lost: bool, task: Task<'_, T>) -> Answer<T, K> {
         let is_searched = self.stage == Stage::Found;
         // A search that ends well has nothing to wait for.
         self.was_lost = if is_searched { self.wait > 0 } else { is_lost };
@@ -312,17 +346,17 @@ impl Solver {
         self.scene = found.map_or(Scene::EMPTY, |fit| fit.scene);
         self.number(&before);
         let mut answer = self.answer(found, task);
-        answer.flags.raise(Flags::MISFIT, is_lost || is_searched && self.pieces >= MOST_PIECES);
+        answer.flags.raise(Flags::MISFIT, is_lost || is_searched && self.pieces >= Self::MOST_PIECES);
         answer
     }
 
     /// Gives contacts the numbers of the nearest ones before.
-    fn number(&mut self, before: &Scene) {
+    fn number(&mut self, before: &Scene<T, K>) {
         let old = self.ids;
-        let (mut given, mut taken) = ([false; MAX_CONTACTS], [false; MAX_CONTACTS]);
+        let (mut given, mut taken) = ([false; K], [false; K]);
         let count = self.scene.count;
         for _ in 0..count.min(before.count) {
-            let mut nearest = (f32::INFINITY, 0, 0);
+            let mut nearest = (T::infinity(), 0, 0);
             for k in (0..count).filter(|k| !given[*k]) {
                 for l in (0..before.count).filter(|l| !taken[*l]) {
                     let [x, y] = [0, 1].map(|d| self.scene.spots[k].at_m[d] - before.spots[l].at_m[d]);
@@ -341,7 +375,7 @@ impl Solver {
         }
     }
 
-    fn answer(&mut self, found: Option<Fit>, task: Task<'_>) -> Answer {
+    fn answer(&mut self, found: Option<Fit<T, K>>, task: Task<'_, T>) -> Answer<T, K> {
         let mut answer = Answer::of(self.work);
         answer.flags.raise(Flags::SATURATED, task.errors.is_full);
         answer.flags.raise(Flags::MORE, self.search.more);
@@ -349,15 +383,15 @@ impl Solver {
         let readings = task.readings();
         let Some(fit) = found.filter(|fit| self.circuit.solve(task.table, fit.scene.spots())) else {
             let voltages = (0..frame.volts.len()).filter(|i| frame.says_at(*i) == Says::Voltage);
-            let squares: f32 = voltages.map(|i| frame.volts[i] * frame.volts[i]).sum();
-            answer.residual = libm::sqrtf(squares / errors.variance_v2 / readings.max(1.0)).min(f32::MAX);
+            let squares: T = voltages.map(|i| frame.volts[i] * frame.volts[i]).sum();
+            answer.residual = (squares / errors.variance_v2 / readings.max(T::ONE)).sqrt().min(T::max_value());
             return answer;
         };
         answer.flags.raise(Flags::MISFIT, is_misfit(&fit, readings));
         answer.flags.raise(Flags::CALIBRATE, is_to_be_calibrated(&fit, task));
-        answer.residual = libm::sqrtf(fit.cost.max(0.0) / readings.max(1.0));
+        answer.residual = (fit.cost.max(T::ZERO) / readings.max(T::ONE)).sqrt();
         let covariance = self.fitting.normal.covariance();
-        let firmest_s = SATURATED_SHEETS * table.head().sheet_s;
+        let firmest_s = T::of(SATURATED_SHEETS) * T::of(table.head().sheet_s);
         for k in 0..self.circuit.count {
             let contact = self.contact(k, table, covariance.as_ref());
             answer.flags.raise(Flags::SATURATED, contact.conductance_s > firmest_s);
@@ -366,45 +400,48 @@ impl Solver {
         answer
     }
 
-    fn contact(&self, k: usize, table: &Table<'_>, covariance: Option<&[Vector; MOST]>) -> Contact {
-        let (loaded, radius_m) = (&self.circuit.loaded[k], table.head().radius_m);
+    fn contact(&self, k: usize, table: &Table<'_>, covariance: Option<&Matrix<T, K>>) -> Contact<T> {
+        let (loaded, radius_m) = (&self.circuit.loaded[k], T::of(table.head().radius_m));
         let first = PARAMETERS * k;
-        let of = |i: usize, j: usize| covariance.map_or(f32::INFINITY, |all| all[first + i][first + j]);
+        let of = |i: usize, j: usize| covariance.map_or(T::infinity(), |all| all[first + i][first + j]);
         // What the readings do not tell is known as well as where a fit may go.
-        let deviation = |i: usize, most: f32| if of(i, i) >= 0.0 { libm::sqrtf(of(i, i)).min(most) } else { most };
-        let log_radius = deviation(3, LN_RADII[1] - LN_RADII[0]);
+        let deviation = |i: usize, most: T| if of(i, i) >= T::ZERO { of(i, i).sqrt().min(most) } else { most };
+        let log_radius = deviation(3, T::of(LN_RADII[1] - LN_RADII[0]));
         let [low_m, high_m] = table.bounds_m();
-        let size = [0, 1].map(|d| (high_m[d] - low_m[d]) / radius_m);
-        let shift = table.head().shift_m / radius_m;
+        let size = [0, 1].map(|d| T::of(high_m[d] - low_m[d]) / radius_m);
+        let shift = T::of(table.head().shift_m) / radius_m;
         let [x, y] = [0, 1].map(|i| {
             let of_readings = deviation(i, size[i]);
-            libm::sqrtf(of_readings * of_readings + shift * shift)
+            (of_readings * of_readings + shift * shift).sqrt()
         });
-        let of_detector = table.head().ln_conductance_error;
-        let most = LN_SQUARES[1] - LN_SQUARES[0];
+        let of_detector = T::of(table.head().ln_conductance_error);
+        let most = T::of(LN_SQUARES[1] - LN_SQUARES[0]);
         let variance = loaded.conductance_variance(table, radius_m, of).min(most * most) + of_detector * of_detector;
         let conductance_s = loaded.conductance_s();
-        let apparent_conductance_s = 1.0 / (loaded.share * loaded.ohm);
+        let apparent_conductance_s = T::ONE / (loaded.share * loaded.ohm);
         Contact {
             id: self.ids[k],
             x_m: loaded.spot.at_m[0],
             y_m: loaded.spot.at_m[1],
             conductance_s,
-            conductance_sigma_s: conductance_s * libm::sqrtf(variance),
+            conductance_sigma_s: conductance_s * variance.sqrt(),
             apparent_conductance_s,
             force_n: table.force_n(loaded.spot.at_m, apparent_conductance_s),
             radius_m: loaded.radius_m,
             radius_sigma_m: loaded.radius_m * log_radius,
             sigma_m: [radius_m * x, radius_m * y],
-            correlation: Some(of(0, 1) / (x * y)).filter(|r| r.is_finite()).map_or(0.0, |r| r.clamp(-1.0, 1.0)),
+            correlation: Some(of(0, 1) / (x * y))
+                .filter(|r| r.is_finite())
+                .map_or(T::ZERO, |r| r.clamp(-T::ONE, T::ONE)),
         }
     }
 }
 
 /// Whether a fit leaves more than noise does, and the table takes that for an error of the detector.
-fn is_to_be_calibrated(fit: &Fit, Task { table, errors, .. }: Task<'_>) -> bool {
-    let noise_v = table.head().noise_v;
+fn is_to_be_calibrated<T: Real, const K: usize>(fit: &Fit<T, K>, task: Task<'_, T>) -> bool {
+    let Task { table, errors, .. } = task;
+    let noise_v = T::of(table.head().noise_v);
     let of_noise = errors.variance_v2 / (noise_v * noise_v);
-    let is_worth_it = of_noise > CALIBRATION_WORTH * CALIBRATION_WORTH;
-    is_worth_it && of_noise * (fit.cost - UNFINISHED) > limit(errors.count as f32 - freedom(fit))
+    let is_worth_it = of_noise > T::of(CALIBRATION_WORTH * CALIBRATION_WORTH);
+    is_worth_it && of_noise * (fit.cost - T::of(UNFINISHED)) > limit(task.readings() - freedom(fit))
 }

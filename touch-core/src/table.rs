@@ -35,6 +35,7 @@
 use crate::crc::crc32;
 use crate::head::NUMBERS;
 pub use crate::head::{EVEN_SPREADING, Head};
+use crate::real::Real;
 use crate::spline::interval;
 
 /// First bytes of a table.
@@ -311,7 +312,7 @@ impl<'a> Table<'a> {
     }
 
     /// Whether a place is on the detector (m).
-    pub fn holds(&self, x_m: f32, y_m: f32) -> bool {
+    pub fn holds<T: Real>(&self, x_m: T, y_m: T) -> bool {
         let ([i, j], _) = self.cell(x_m, y_m);
         let index = j * self.cells()[0] + i;
         self.mask.get(index / 8).is_some_and(|byte| byte >> (index % 8) & 1 == 1)
@@ -324,16 +325,16 @@ impl<'a> Table<'a> {
     }
 
     /// The nearest place of that rectangle (m).
-    pub(crate) fn held(&self, [x_m, y_m]: [f32; 2]) -> [f32; 2] {
-        let [low_m, high_m] = self.bounds_m();
+    pub(crate) fn held<T: Real>(&self, [x_m, y_m]: [T; 2]) -> [T; 2] {
+        let [low_m, high_m] = self.bounds_m().map(|corner_m| corner_m.map(T::of));
         [x_m.max(low_m[0]).min(high_m[0]), y_m.max(low_m[1]).min(high_m[1])]
     }
 
     /// The cell of a place, and the shares of the ways through it.
-    pub(crate) fn cell(&self, x_m: f32, y_m: f32) -> ([usize; 2], [f32; 2]) {
+    pub(crate) fn cell<T: Real>(&self, x_m: T, y_m: T) -> ([usize; 2], [T; 2]) {
         let [columns, rows] = self.cells();
-        let (i, x) = interval((x_m - self.head.left_m) / self.head.step_x_m, columns);
-        let (j, y) = interval((y_m - self.head.bottom_m) / self.head.step_y_m, rows);
+        let (i, x) = interval((x_m - T::of(self.head.left_m)) / T::of(self.head.step_x_m), columns);
+        let (j, y) = interval((y_m - T::of(self.head.bottom_m)) / T::of(self.head.step_y_m), rows);
         ([i, j], [x, y])
     }
 }

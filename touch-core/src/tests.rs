@@ -4,12 +4,19 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use crate::circuit::{Circuit, Spot};
 use crate::frame::Errors;
-use crate::normal::{ANY_RADIUS, Normal, PARAMETERS};
+use crate::normal::ANY_RADIUS;
 use crate::samples::{seal, table};
 use crate::table::MAX_ELECTRODES;
-use crate::{Flags, Frame, FrameError, Says, Solver, Table, TableError};
+use crate::vector::PARAMETERS;
+use crate::{BOARD_CONTACTS, Flags, Frame, FrameError, Says, Solver, Table, TableError};
+
+/// As on a board.
+pub(crate) type Spot = crate::circuit::Spot<f32>;
+pub(crate) type Circuit = crate::circuit::Circuit<f32, BOARD_CONTACTS>;
+pub(crate) type Normal = crate::normal::Normal<f32, BOARD_CONTACTS>;
+pub(crate) type Scene = crate::fit::Scene<f32, BOARD_CONTACTS>;
+pub(crate) type Fit = crate::fit::Fit<f32, BOARD_CONTACTS>;
 
 pub(crate) fn spot(x_m: f32, y_m: f32, sheets: f32) -> Spot {
     Spot { at_m: [x_m, y_m], ln_ohm: (1.0 / (sheets * 1.1e-3) + 600.0).ln(), ln_radius: 0.0 }
@@ -97,7 +104,7 @@ fn up_to_three_contacts_are_found_and_followed() {
     let table = Table::read(&bytes).unwrap();
     let truth = [spot(0.004, -0.011, 0.3), spot(-0.015, 0.008, 1.0), spot(0.019, 0.014, 0.1)];
     for count in 0..=truth.len() {
-        let mut solver = Solver::new();
+        let mut solver = <Solver>::patient();
         let read = |truth: &[Spot], seed| match truth {
             [] => noisy(&[0.0; 256], seed),
             some => noisy(&volts(&table, some), seed),
@@ -126,6 +133,42 @@ fn up_to_three_contacts_are_found_and_followed() {
         assert!(count == 0 || (landing.flags.has(Flags::MISFIT) && landing.work.looks == 0), "{count} {landing:?}");
         let landed = solver.solve(&table, &Frame::of_volts(&read(&truth[..count], 6))).unwrap();
         assert_eq!((landed.contacts().len(), landed.flags), (count, Flags::default()), "{landed:?}");
+    }
+}
+
+#[test]
+fn a_press_of_one_frame_is_found_unless_patience_is_asked_for() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let press = noisy(&volts(&table, &[spot(0.004, -0.011, 0.3), spot(-0.015, 0.008, 1.0)]), 1);
+    let other = noisy(&volts(&table, &[spot(0.019, 0.014, 0.1)]), 2);
+    let rest = noisy(&[0.0; 256], 3);
+    let counts = |mut solver: Solver| {
+        [&rest, &press, &rest, &press, &other, &rest].map(|read| {
+            let answer = solver.solve(&table, &Frame::of_volts(read)).unwrap();
+            (answer.contacts().len(), answer.flags.has(Flags::MISFIT))
+        })
+    };
+    assert_eq!(counts(Solver::new()), [0, 2, 0, 2, 1, 0].map(|count| (count, false)));
+    let waiting = counts(Solver::patient());
+    assert_eq!(waiting[..2], [(0, false), (0, true)]);
+}
+
+#[test]
+fn more_digits_and_room_for_more_contacts_find_the_same() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let all = [spot(0.004, -0.011, 0.3), spot(-0.015, 0.008, 1.0), spot(0.019, 0.014, 0.1)];
+    for count in 1..=all.len() {
+        let read = noisy(&volts(&table, &all[..count]), count as u32);
+        let exact: Vec<_> = read.iter().map(|volts| f64::from(*volts)).collect();
+        let board = Solver::new().solve(&table, &Frame::of_volts(&read)).unwrap();
+        let host = Solver::<f64, 8>::default().solve(&table, &Frame::of_volts(&exact)).unwrap();
+        assert_eq!((host.contacts().len(), host.flags), (count, board.flags));
+        for (ours, theirs) in host.contacts().iter().zip(board.contacts()) {
+            let [x_m, y_m] = [ours.x_m - f64::from(theirs.x_m), ours.y_m - f64::from(theirs.y_m)];
+            assert!(x_m.hypot(y_m) < 1e-3 * f64::from(table.head().radius_m), "{ours:?} {theirs:?}");
+        }
     }
 }
 

@@ -39,7 +39,7 @@ impl<S: TableStore, const READINGS: usize> ContactFinder<S, READINGS> {
             tables: Tables::new(store),
             input: Input::NONE,
             output: Output::Frames,
-            solver: Solver::new(),
+            solver: Solver::patient(),
             cells: Cells::NONE,
             broken_wires: 0,
             last_broken: 0,

@@ -1,4 +1,6 @@
 //! `core`: the contacts that a board finds by itself, from a table that the detector was compiled to.
+//!
+//! On a computer it works in [`Number`]s, and finds up to [`MOST_CONTACTS`].
 
 mod between;
 mod file;
@@ -10,7 +12,7 @@ mod unknown;
 use std::sync::Arc;
 
 use tactomo_touch_core::{
-    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Says as CoreSays, Solver as Core, Table,
+    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Real, Says as CoreSays, Solver as Core, Table,
 };
 
 pub use self::file::{CompiledTable, TableFileError};
@@ -24,12 +26,17 @@ use tactomo_physics::detector::ForceLaw;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::{Readings, Says};
 
-/// `core`: up to three contacts, in `f32`, as on a board.
+/// What it works in.
+type Number = f64;
+/// Most contacts that it looks for.
+const MOST_CONTACTS: usize = 8;
+
+/// `core`: contacts by the board's own search, by a table.
 pub struct Compiled {
     bytes: Arc<[u8]>,
     electrodes: usize,
     drive_v: f64,
-    core: Core,
+    core: Core<Number, MOST_CONTACTS>,
 }
 
 impl Compiled {
@@ -46,13 +53,13 @@ impl Compiled {
         })?;
         Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
         let (electrodes, drive_v) = (detector.electrodes.len(), detector.drive_v);
-        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Core::new() })
+        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Core::default() })
     }
 
-    /// A reading as a board can give it (V): none is far beyond its drive. Numbers from elsewhere may be none in `f32`.
-    fn held(&self, volts: f64) -> f32 {
+    /// A reading as a board can give it (V): none is far beyond its drive.
+    fn held(&self, volts: f64) -> Number {
         let most_v = 2.0 * self.drive_v;
-        (if volts.is_finite() { volts.clamp(-most_v, most_v) } else { volts }) as f32
+        Number::of(if volts.is_finite() { volts.clamp(-most_v, most_v) } else { volts })
     }
 }
 
@@ -99,7 +106,7 @@ fn core_says(says: Says) -> CoreSays {
     }
 }
 
-fn solution(answer: &Answer) -> Solution {
+fn solution(answer: &Answer<Number, MOST_CONTACTS>) -> Solution {
     let flags = answer.flags;
     Solution {
         contacts: answer.contacts().iter().map(found).collect(),
@@ -114,7 +121,7 @@ fn solution(answer: &Answer) -> Solution {
     }
 }
 
-fn found(contact: &Contact) -> FoundContact {
+fn found(contact: &Contact<Number>) -> FoundContact {
     let [x_m, y_m] = contact.sigma_m.map(f64::from);
     let uncertainty = Uncertainty {
         x_m,
