@@ -151,7 +151,7 @@ const TABLE: [Row; 14] = [
     Row {
         method: Method::Core,
         name: "core",
-        explanation: "for boards without a computer, and to see here what they find: up to three contacts from a compiled table, with standard errors",
+        explanation: "fast, and what boards without a computer run: up to eight contacts (on a board three) from a compiled table, with standard errors",
         family: Family::Contacts,
         parameter: None,
         build: |problem, _| Ok(Box::new(Compiled::new(problem)?)),

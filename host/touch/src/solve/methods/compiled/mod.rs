@@ -27,7 +27,7 @@ use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::{Readings, Says};
 
 /// What it works in.
-type Number = f64;
+type Number = f32;
 /// Most contacts that it looks for.
 const MOST_CONTACTS: usize = 8;
 
