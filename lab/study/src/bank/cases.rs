@@ -39,7 +39,7 @@ pub struct Case {
     /// Detectors as they are described, which scenes have in turns.
     #[serde(serialize_with = "names")]
     pub detectors: Vec<Detector>,
-    /// Seeds of what was built of each; none leaves them as they are described, and known exactly.
+    /// Seeds of what was built of each; none leaves them as they are described, and known exactly. An independent solution is what was built.
     pub built: Vec<u64>,
     /// By how many standard deviations of its tolerance the top of what was built conducts better than the bottom; as drawn without it.
     pub top_over_bottom: Option<f64>,
