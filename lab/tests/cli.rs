@@ -43,6 +43,8 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         (&["stability", "--quick", "--csv", file], exists),
         (&["live", "--csv", file], exists),
         (&["bank", "--case", "exakt"], "the bank has no case `exakt`; it has `exact`, `exact corners`"),
+        (&["bank", "--independent", "no/such.npz"], "cannot read no/such.npz"),
+        (&["bank", "--independent", file], "/Cargo.toml: not an NPZ file"),
         (&["live", "--scene", "single", "--scan", "99"], "--scan 99, scene single: there is no electrode 99"),
     ] {
         let message = LAB.refused(args);

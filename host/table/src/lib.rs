@@ -2,6 +2,7 @@
 //!
 //! [`mod@file`] bounds what is read of any file that is read whole.
 
+mod archive;
 mod channels;
 mod csv;
 pub mod file;
@@ -12,6 +13,7 @@ mod npz;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use self::archive::Archive;
 pub use self::channels::{Channels, channels};
 pub use self::csv::CsvWriter;
 use self::file::Format;
@@ -143,7 +145,11 @@ impl Table {
         }
         match &mut arrays[..] {
             [(_, lone)] => Ok(std::mem::take(lone)),
-            _ => Err(format!("no array is called {}; there are {}", wanted.join(" or "), names(&arrays))),
+            _ => Err(format!(
+                "no array is called {}; there are {}",
+                wanted.join(" or "),
+                names(arrays.iter().map(|(name, _)| name))
+            )),
         }
     }
 }
@@ -154,8 +160,8 @@ fn bytes_of(path: &Path) -> Result<Vec<u8>, TableError> {
 }
 
 /// Names of arrays, for messages.
-fn names(arrays: &[(String, Array)]) -> String {
-    let names: Vec<_> = arrays.iter().map(|(name, _)| name.escape_debug().to_string()).collect();
+fn names<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let names: Vec<_> = names.map(|name| name.escape_debug().to_string()).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 

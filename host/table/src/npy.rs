@@ -12,6 +12,18 @@ const ALIGNMENT: usize = 64;
 /// Most axes of an array.
 const MOST_AXES: usize = 8;
 
+/// Bytes of a character of a text (UTF-32).
+const CHARACTER_BYTES: usize = 4;
+
+/// What an array holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Numbers.
+    Numbers(Array),
+    /// A single text: of an array without dimensions.
+    Text(String),
+}
+
 /// Whether a file begins as one of these.
 pub fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
@@ -22,10 +34,55 @@ pub fn is_npy(bytes: &[u8]) -> bool {
 /// # Errors
 /// What is wrong with it.
 pub fn parse(bytes: &[u8]) -> Result<Array, String> {
-    let (header, data) = split(bytes).ok_or("the header of the array is cut off")?;
-    let kind = after(header, "'descr':").and_then(quoted).ok_or("the array has no kind of number")?;
-    let shape = after(header, "'shape':").and_then(shape).ok_or("the array has no shape")?;
-    let by_columns = after(header, "'fortran_order':").is_some_and(|rest| rest.trim_start().starts_with("True"));
+    numbers(Header::of(bytes)?)
+}
+
+/// Reads the array, which may be a text.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn parse_value(bytes: &[u8]) -> Result<Value, String> {
+    let header = Header::of(bytes)?;
+    match header.kind.as_bytes() {
+        [order @ (b'<' | b'>'), b'U', ..] if header.shape.is_empty() => text(&header, *order == b'>').map(Value::Text),
+        [_, b'U', ..] => Err("an array of texts is not read, only a single text".to_owned()),
+        _ => numbers(header).map(Value::Numbers),
+    }
+}
+
+/// What a file says of its array, and the array's bytes.
+struct Header<'a> {
+    kind: &'a str,
+    shape: Vec<usize>,
+    by_columns: bool,
+    data: &'a [u8],
+}
+
+impl<'a> Header<'a> {
+    fn of(bytes: &'a [u8]) -> Result<Self, String> {
+        let (header, data) = split(bytes).ok_or("the header of the array is cut off")?;
+        let kind = after(header, "'descr':").and_then(quoted).ok_or("the array has no kind of number")?;
+        let shape = after(header, "'shape':").and_then(shape).ok_or("the array has no shape")?;
+        let by_columns = after(header, "'fortran_order':").is_some_and(|rest| rest.trim_start().starts_with("True"));
+        Ok(Self { kind, shape, by_columns, data })
+    }
+}
+
+/// A text, which NumPy fills up with zeros.
+fn text(header: &Header, big_end_first: bool) -> Result<String, String> {
+    let Header { kind, data, .. } = header;
+    let characters: Option<usize> = kind.get(2..).and_then(|length| length.parse().ok());
+    if characters.and_then(|count| count.checked_mul(CHARACTER_BYTES)) != Some(data.len()) {
+        return Err(format!("the text has {} bytes, which is not {}", data.len(), kind.escape_debug()));
+    }
+    let codes = data.as_chunks::<CHARACTER_BYTES>().0.iter();
+    let codes = codes.map(|bytes| if big_end_first { u32::from_be_bytes(*bytes) } else { u32::from_le_bytes(*bytes) });
+    let text: Option<String> = codes.map(char::from_u32).collect();
+    let text = text.ok_or("the text has what is no character")?;
+    Ok(text.trim_end_matches('\0').to_owned())
+}
+
+fn numbers(Header { kind, shape, by_columns, data }: Header) -> Result<Array, String> {
     let number = Number::of(kind)?;
     let count = shape.iter().try_fold(1usize, |count, &length| count.checked_mul(length));
     let needed = count.and_then(|count| count.checked_mul(number.bytes));
@@ -126,7 +183,7 @@ impl Number {
     }
 }
 
-/// Numbers of an array, in the kind in which they are kept.
+/// What an array is of, in the kind in which it is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Values<'a> {
     /// In double precision.
@@ -135,15 +192,18 @@ pub enum Values<'a> {
     Integers(&'a [i64]),
     /// In a byte each.
     Flags(&'a [bool]),
+    /// A text, of an array without dimensions.
+    Text(&'a str),
 }
 
 impl Values<'_> {
     /// What NumPy calls their kind.
-    fn kind(self) -> &'static str {
+    fn kind(self) -> String {
         match self {
-            Self::Numbers(_) => "<f8",
-            Self::Integers(_) => "<i8",
-            Self::Flags(_) => "|b1",
+            Self::Numbers(_) => "<f8".to_owned(),
+            Self::Integers(_) => "<i8".to_owned(),
+            Self::Flags(_) => "|b1".to_owned(),
+            Self::Text(text) => format!("<U{}", text.chars().count()),
         }
     }
 
@@ -152,6 +212,7 @@ impl Values<'_> {
             Self::Numbers(values) => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
             Self::Integers(values) => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
             Self::Flags(values) => values.iter().map(|value| u8::from(*value)).collect(),
+            Self::Text(text) => text.chars().flat_map(|character| u32::from(character).to_le_bytes()).collect(),
         }
     }
 }
@@ -194,6 +255,28 @@ mod tests {
         let integers = bytes(&[2], Values::Integers(&[-1, 1 << 52]));
         assert_eq!(parse(&integers), Ok(Array::flat(vec![-1.0, (1u64 << 52) as f64])));
         assert_eq!(parse(&bytes(&[2], Values::Flags(&[true, false]))), Ok(Array::flat(vec![1.0, 0.0])));
+    }
+
+    #[test]
+    fn a_text_is_read_as_numpy_keeps_it() {
+        let read = |kind: &str, shape: &str, data: &[u8]| {
+            parse_value(&file(&format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}"), data))
+        };
+        let text = |text: &str| Ok(Value::Text(text.to_owned()));
+        assert_eq!(parse_value(&bytes(&[], Values::Text("{\"r\": \"5 \u{b5}m\"}"))), text("{\"r\": \"5 \u{b5}m\"}"));
+        assert_eq!(read("<U3", "()", b"a\0\0\0b\0\0\0\0\0\0\0"), text("ab"), "filled up with zeros");
+        assert_eq!(read(">U1", "()", b"\0\0\0a"), text("a"));
+        assert_eq!(read("<f8", "()", &[0; 8]), Ok(Value::Numbers(Array { shape: Vec::new(), values: vec![0.0] })));
+        for (kind, shape, data, what) in [
+            ("<U2", "()", &b"a\0\0\0"[..], "4 bytes, which is not <U2"),
+            ("<U", "()", b"", "not <U"),
+            ("<U99999999999999999999", "()", b"", "not <U9"),
+            ("<U1", "()", &[0xff; 4], "no character"),
+            ("<U1", "(1,)", b"a\0\0\0", "an array of texts"),
+            ("|S1", "()", b"a", "arrays of |S1 are not read"),
+        ] {
+            assert!(read(kind, shape, data).is_err_and(|error| error.contains(what)), "{kind} {shape}");
+        }
     }
 
     #[test]

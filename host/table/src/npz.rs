@@ -5,7 +5,7 @@ use std::io::{self, Cursor, Read, Seek, Write};
 use zip::write::{SimpleFileOptions, ZipWriter};
 use zip::{CompressionMethod, ZipArchive};
 
-use super::npy::Values;
+use super::npy::{Value, Values};
 use super::{Array, LONGEST, kinds, npy};
 
 /// Most arrays in an archive.
@@ -21,6 +21,19 @@ pub fn is_npz(bytes: &[u8]) -> bool {
 /// # Errors
 /// What is wrong, and in which array.
 pub fn parse(bytes: &[u8]) -> Result<Vec<(String, Array)>, String> {
+    each(bytes, npy::parse)
+}
+
+/// Reads all arrays, of which some may be texts; bounded likewise.
+///
+/// # Errors
+/// What is wrong, and in which array.
+pub fn parse_values(bytes: &[u8]) -> Result<Vec<(String, Value)>, String> {
+    each(bytes, npy::parse_value)
+}
+
+/// Reads what the archive holds, each array with its name.
+fn each<T>(bytes: &[u8], parse: impl Fn(&[u8]) -> Result<T, String>) -> Result<Vec<(String, T)>, String> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| format!("not an NPZ file: {error}"))?;
     if let Some(other) = kinds::archive(archive.file_names()) {
         return Err(other);
@@ -37,7 +50,7 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<(String, Array)>, String> {
         // The length in the archive's directory is not trusted.
         file.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| located(error.to_string()))?;
         room = room.checked_sub(bytes.len() as u64).ok_or_else(|| located("too long".to_owned()))?;
-        arrays.push((name.clone(), npy::parse(&bytes).map_err(located)?));
+        arrays.push((name.clone(), parse(&bytes).map_err(located)?));
     }
     Ok(arrays)
 }
@@ -95,6 +108,16 @@ mod tests {
         assert_eq!(arrays[0], ("x_m".to_owned(), Array::flat(vec![1.0, 2.0, 3.0])));
         assert_eq!(arrays[1].0, "readings_v");
         assert_eq!(arrays[1].1.shape, [1, 2]);
+    }
+
+    #[test]
+    fn a_text_is_read_where_it_is_asked_for_and_refused_among_numbers() {
+        let mut bytes = Vec::new();
+        let mut writer = NpzWriter::new(Cursor::new(&mut bytes));
+        writer.add_values("meta", &[], Values::Text("{}")).unwrap();
+        writer.finish().unwrap();
+        assert_eq!(parse_values(&bytes), Ok(vec![("meta".to_owned(), Value::Text("{}".to_owned()))]));
+        assert!(parse(&bytes).unwrap_err().starts_with("array meta: arrays of <U2 are not read"));
     }
 
     #[test]

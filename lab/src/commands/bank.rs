@@ -1,9 +1,12 @@
 //! `tactomo-lab bank`: how right, how sure and how fast solvers are, side by side.
 
+use std::path::PathBuf;
+
 use tactomo_cli::choice;
 use tactomo_cli::options;
 use tactomo_cli::output::{self, message};
-use tactomo_physics::detector::Chosen;
+use tactomo_physics::detector::{Chosen, Detector};
+use tactomo_study::Independent;
 use tactomo_study::bank::{self, Case, Plan, Scenes};
 use tactomo_touch::solve::Method;
 
@@ -13,12 +16,14 @@ use super::shown::Shown;
 ///
 /// Without --scenes, all cases of the bank. Random contacts have radii of 1 to 6 mm for electrodes at 15 mm, in proportion for others,
 /// and conductances of 1e-5 to 1e-1 S, both even in the logarithm. Readings are of the finest model with the converter's noise.
+/// With --independent, readings are of another program's solution of a detector, and contacts are of its patches.
 /// Errors are compared with the Cramer-Rao bound and with the standard errors that the solver claims, times with those of tikhonov.
 ///
 /// Examples:
 ///   tactomo-lab bank --solver auto --solver core --count 40
 ///   tactomo-lab bank --case "built, near" --seed 7 --worst 3
 ///   tactomo-lab bank --scenes random --detector square-60 --as-built 20 --rub 20 --count 60 --json
+///   tactomo-lab bank --independent solved.npz --described square-60 --solver auto --count 20
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -29,7 +34,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME", conflicts_with = "scenes")]
     case: Vec<String>,
     /// How many detectors as built a case of the bank has, drawn with this seed and those after it
-    #[arg(long, default_value_t = 4, conflicts_with = "scenes", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, default_value_t = 4, conflicts_with_all = ["scenes", "independent"], value_parser = clap::value_parser!(u64).range(1..=1000))]
     builds: u64,
     /// What touches, in place of the cases of the bank: random, single, corner, row, near, hand, or shape
     #[arg(long, value_name = "KIND")]
@@ -48,6 +53,13 @@ pub struct Args {
     /// Calibrates each detector as built before, with so many single presses at unknown places
     #[arg(long, value_name = "PRESSES", default_value_t = 0, requires = "as_built")]
     rub: usize,
+    /// Solution of another program (NPZ), for validation: in place of the cases of the bank, single presses, pairs, triples and hands on its
+    /// patches; give it again for more
+    #[arg(long, value_name = "FILE", conflicts_with = "scenes")]
+    independent: Vec<PathBuf>,
+    /// What solvers know of the detector that was solved, with its tolerances: name of a preset, or a TOML file [default: square-60]
+    #[arg(long, value_name = "NAME|FILE", requires = "independent")]
+    described: Option<Chosen>,
     /// How many scenes of each case
     #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     count: u32,
@@ -70,7 +82,13 @@ pub struct Args {
 impl Args {
     /// The cases that are asked for.
     fn cases(&self) -> anyhow::Result<Vec<Case>> {
-        let Some(scenes) = self.scenes else { return named(&self.case, Case::bank(self.seed, self.builds)) };
+        let Some(scenes) = self.scenes else {
+            let all = match self.independent[..] {
+                [] => Case::bank(self.seed, self.builds),
+                _ => self.on_patches()?,
+            };
+            return named(&self.case, all);
+        };
         let detectors = match self.detector[..] {
             [] => bank::detectors(),
             _ => choice::detectors(&self.detector, &[])?,
@@ -78,6 +96,14 @@ impl Args {
         let case = Case::of(scenes.name(), scenes, detectors);
         let (built, top_over_bottom) = (self.as_built.clone(), self.top_over_bottom);
         Ok(vec![Case { built, top_over_bottom, rub: self.rub, ..case }])
+    }
+
+    /// The cases of independent solutions.
+    fn on_patches(&self) -> anyhow::Result<Vec<Case>> {
+        let described = self.described.as_ref().map_or_else(|| Ok(Detector::default()), Chosen::get)?;
+        let of = |file: &PathBuf| Ok(Case::independent(Independent::read(file)?, &described));
+        let cases: anyhow::Result<Vec<_>> = self.independent.iter().map(of).collect();
+        Ok(cases?.concat())
     }
 }
 

@@ -1,15 +1,19 @@
 //! What solvers are tried with: a detector, the model of it that is inverted, and frames from a finer one.
 
+mod truth;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::DMatrix;
 
+use self::truth::Truth;
+use super::independent::Independent;
 use super::scenes::electrode_distance_m;
 use tactomo_physics::baseline::{Baseline, BaselinePatterns, BaselineSum, Leakage};
 use tactomo_physics::detector::{Adc, Detector, Electrode, Tolerances};
 use tactomo_physics::forward::jacobian::Jacobian;
-use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
+use tactomo_physics::forward::{Auto, ForwardError, ForwardModel};
 use tactomo_physics::readings::{Range, Readings};
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{CannotDraw, Fault, FaultError, Measurement, drawn, finer_model};
@@ -53,6 +57,14 @@ pub enum StudyError {
         /// Its name.
         detector: String,
     },
+    /// An independent solution has no such scenes, or is of another detector.
+    #[error("{solution}: {what}")]
+    Independent {
+        /// Its name.
+        solution: String,
+        /// What is wrong.
+        what: String,
+    },
 }
 
 /// What was there and what was read.
@@ -76,7 +88,7 @@ pub struct Experiment {
     pub model_time: Duration,
     /// Name of the inverted model.
     pub model: String,
-    truth: Arc<dyn ForwardModel>,
+    truth: Truth,
     /// The detector as it is, and as it is measured: no solver sees it.
     built: Detector,
     faults: Vec<Fault>,
@@ -125,9 +137,9 @@ impl Experiment {
         if let Some(fault) = faults.iter().find(|fault| fault.is_of_time()) {
             return Err(StudyError::OfTime { fault: fault.to_string() });
         }
-        let truth: Arc<dyn ForwardModel> = match faults.iter().any(Fault::is_of_model) {
+        let truth = match faults.iter().any(Fault::is_of_model) {
             true => finer_model(&self.built, faults, seed)?.into(),
-            false => Arc::clone(&self.truth),
+            false => self.truth.clone(),
         };
         Ok(Self { truth, faults: faults.to_vec(), ..self.again() })
     }
@@ -185,10 +197,23 @@ impl Experiment {
     /// [`StudyError`] if it cannot be modelled.
     pub fn with_truth(&self, detector: &Detector) -> Result<Self, StudyError> {
         let truth = match self.faults.is_empty() && unmeasured(detector) == unmeasured(&self.built) {
-            true => Arc::clone(&self.truth),
+            true => self.truth.clone(),
             false => finer_model(detector, &[], 0)?.into(),
         };
         Ok(Self { truth, built: detector.clone(), ..self.again() })
+    }
+
+    /// The same description and its tolerances, in truth what another program solved, whose patches alone can touch.
+    ///
+    /// # Errors
+    /// [`StudyError::Independent`] if that has another number of electrodes.
+    pub fn solved_by(&self, solution: Arc<Independent>) -> Result<Self, StudyError> {
+        let (there, described) = (solution.electrodes, self.detector.electrodes.len());
+        if there != described {
+            let what = format!("it has {there} electrodes, but {} has {described}", self.detector.name);
+            return Err(StudyError::Independent { solution: solution.name.clone(), what });
+        }
+        Ok(Self { truth: Truth::Independent(solution), ..self.tolerant() })
     }
 
     /// The same truth, described to solvers in another way: as a calibration found it.
@@ -211,7 +236,8 @@ impl Experiment {
     /// # Errors
     /// [`StudyError`] if a contact is off the detector.
     pub fn with_baseline(&self, contacts: &[Contact]) -> Result<Self, StudyError> {
-        Ok(Self { rest_ohm: Some(self.truth.impedance_ohm(contacts)?), ..self.again() })
+        let touches: Vec<Touch> = contacts.iter().copied().map(Touch::from).collect();
+        Ok(Self { rest_ohm: Some(self.truth.impedance_ohm(&touches)?), ..self.again() })
     }
 
     /// The same, whose baseline was taken of a detector as it was before, and is not followed: what `--rest` says of a recording.
@@ -252,7 +278,7 @@ impl Experiment {
             problem: self.problem.clone(),
             model_time: self.model_time,
             model: self.model.clone(),
-            truth: Arc::clone(&self.truth),
+            truth: self.truth.clone(),
             built: self.built.clone(),
             whole: Arc::clone(&self.whole),
             faults: self.faults.clone(),
@@ -323,7 +349,7 @@ impl Experiment {
         for touches in touches {
             let impedance_ohm = match last.take() {
                 Some((before, impedance_ohm)) if before == touches => impedance_ohm,
-                _ => match touched_impedance_ohm(&*self.truth, touches) {
+                _ => match self.truth.impedance_ohm(touches) {
                     Err(ForwardError::NoContact) if touches.is_empty() => None,
                     impedance_ohm => Some(impedance_ohm?),
                 },

@@ -1,10 +1,14 @@
 //! The frozen cases of the bank, and those that are asked for.
 
+use std::sync::Arc;
+
 use serde::{Serialize, Serializer};
 
-use super::scenes::Scenes;
+use super::patches::{Grip, OnPatches};
+use super::scenes::{Scenes, TriedScene};
 use crate::calibrate::{Calibrate, Calibrated};
 use crate::experiment::{Experiment, StudyError};
+use crate::independent::Independent;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Detector, FOAMS, Layer};
 use tactomo_physics::simulate::drawn_top_over_bottom;
@@ -15,17 +19,27 @@ const GRADING: f64 = 10.0;
 /// ESP32: by 1.4 to 2.9 on the three of 75 detectors as built (seeds 9, 104, 120).
 const TOP_OVER_BOTTOM: f64 = 2.5;
 
+/// What touches, and what readings are of.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum Touching {
+    /// Anything anywhere: readings are of the finest model.
+    Anywhere(Scenes),
+    /// Patches of an independent solution, which readings are of.
+    OnPatches(OnPatches),
+}
+
 /// Scenes on detectors, and what is known of these.
 #[derive(Clone, Debug, Serialize)]
 pub struct Case {
     /// What it is called.
     pub name: String,
     /// What touches.
-    pub scenes: Scenes,
+    pub scenes: Touching,
     /// Detectors as they are described, which scenes have in turns.
     #[serde(serialize_with = "names")]
     pub detectors: Vec<Detector>,
-    /// Seeds of what was built of each; none leaves them as they are described, and known exactly.
+    /// Seeds of what was built of each; none leaves them as they are described, and known exactly. An independent solution is what was built.
     pub built: Vec<u64>,
     /// By how many standard deviations of its tolerance the top of what was built conducts better than the bottom; as drawn without it.
     pub top_over_bottom: Option<f64>,
@@ -53,6 +67,7 @@ fn graded() -> Detector {
 impl Case {
     /// Scenes on detectors that are as described, which solvers take as exact.
     pub fn of(name: impl Into<String>, scenes: Scenes, detectors: Vec<Detector>) -> Self {
+        let scenes = Touching::Anywhere(scenes);
         Self { name: name.into(), scenes, detectors, built: Vec::new(), top_over_bottom: None, rub: 0 }
     }
 
@@ -85,17 +100,53 @@ impl Case {
         ]
     }
 
+    /// Scenes on the patches of an independent solution, a case for each number of them. Solvers know the description of the detector
+    /// and its tolerances.
+    pub fn independent(solution: Independent, described: &Detector) -> Vec<Self> {
+        let independent = Arc::new(solution);
+        let of = |grip: Grip| Self {
+            name: format!("{}, {}", independent.name, grip.name()),
+            scenes: Touching::OnPatches(OnPatches { independent: Arc::clone(&independent), grip }),
+            detectors: vec![described.clone()],
+            built: Vec::new(),
+            top_over_bottom: None,
+            rub: 0,
+        };
+        Grip::ALL.map(of).into()
+    }
+
+    /// So many scenes of its detectors in turns.
+    pub(super) fn tried(&self, count: usize, seed: u64) -> Result<Vec<TriedScene>, StudyError> {
+        match &self.scenes {
+            Touching::Anywhere(scenes) => Ok(scenes.of(&self.described(), count, seed)),
+            Touching::OnPatches(patches) => patches.of(&self.detectors[0], count, seed),
+        }
+    }
+
+    /// What kinds of scenes there are, as its rows name them.
+    pub(super) fn kinds(&self) -> &'static [&'static str] {
+        match &self.scenes {
+            Touching::Anywhere(scenes) => scenes.kinds(),
+            Touching::OnPatches(_) => &[],
+        }
+    }
+
     /// The descriptions of its [experiments](Self::experiments), in their order.
     pub(super) fn described(&self) -> Vec<Detector> {
         let times = self.built.len().max(1);
         self.detectors.iter().flat_map(|detector| std::iter::repeat_n(detector.clone(), times)).collect()
     }
 
-    /// Each detector as it is described, or as it was built with each seed and perhaps calibrated by presses of another seed than `seed`.
+    /// Each detector as it is described, or as it was built with each seed and perhaps calibrated by presses of another seed than `seed`; or what an
+    /// independent solution is of.
     pub(super) fn experiments(&self, seed: u64, progress: &mut dyn FnMut(&str)) -> Result<Vec<Experiment>, StudyError> {
         let mut all = Vec::new();
         for detector in &self.detectors {
             let sound = Experiment::new(detector)?;
+            if let Touching::OnPatches(OnPatches { independent, .. }) = &self.scenes {
+                all.push(sound.solved_by(Arc::clone(independent))?);
+                continue;
+            }
             for built in &self.built {
                 let truth = drawn_top_over_bottom(detector, *built, self.top_over_bottom)?;
                 all.push(self.calibrated(sound.made_as(&truth)?, seed, progress)?);

@@ -2,6 +2,7 @@
 
 mod cases;
 mod judge;
+mod patches;
 mod places;
 mod rows;
 mod scenes;
@@ -20,8 +21,9 @@ use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_touch::solve::{Method, Solution, Solver};
 
-pub use self::cases::{Case, detectors};
+pub use self::cases::{Case, Touching, detectors};
 pub use self::judge::{Judged, Match, Place, TrueContact};
+pub use self::patches::{Grip, OnPatches};
 pub use self::rows::{Claims, ContactFigures, Quantiles, Row, SceneFigures};
 pub use self::scenes::Scenes;
 pub use self::view::view;
@@ -109,7 +111,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
     for case in &plan.cases {
         progress(&format!("{}: models", case.name));
         let experiments = case.experiments(plan.seed, progress)?;
-        let scenes = case.scenes.of(&case.described(), plan.scenes, plan.seed);
+        let scenes = case.tried(plan.scenes, plan.seed)?;
         progress(&format!("{}: {} scenes", case.name, scenes.len()));
         let all = try_all(plan, case, &experiments, &scenes)?;
         for method in &plan.methods {
@@ -231,6 +233,7 @@ fn worst(mut trials: Vec<Trial>, count: usize) -> Vec<Trial> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::independent::tests::Contents;
     use tactomo_physics::detector::Detector;
 
     fn plan(threads: usize) -> Plan {
@@ -278,6 +281,25 @@ mod tests {
         assert!(exact.and_then(|row| row.contacts.over_bound).is_some_and(|over| over.median < 3.0), "{exact:?}");
         let text = crate::view::text(&[view(&report)]);
         assert!(plan.cases.iter().all(|case| text.contains(&case.name)) && !text.contains("NaN"), "{text}");
+    }
+
+    /// A network of resistors, which is no more than alike to the detector: each case has its figures all the same.
+    #[test]
+    fn scenes_of_an_independent_solution_are_tried_as_others_are() {
+        let solution = || Contents::of_network().read().unwrap();
+        let cases = Case::independent(solution(), &Detector::default());
+        let names: Vec<_> = cases.iter().map(|case| case.name.clone()).collect();
+        assert_eq!(names, ["singles", "pairs", "triples", "hands"].map(|grip| format!("network, {grip}")));
+        let plan = Plan { cases, methods: vec![Method::Tikhonov, Method::Core], scenes: 3, ..plan(1) };
+        let report = run(&plan, "", &mut |_| ()).unwrap();
+        let all: Vec<_> = report.rows.iter().filter(|row| row.class == "all").collect();
+        assert_eq!(all.len(), 8);
+        assert!(all.iter().all(|row| row.contacts.visible > 0 && row.scenes.is_some()));
+        let json = serde_json::to_value(&report.cases[1].scenes).unwrap();
+        assert_eq!(json, serde_json::json!({"independent": "network", "grip": "pair"}));
+        let other = Detector::preset("display-140x70").unwrap();
+        let refused = run(&Plan { cases: Case::independent(solution(), &other), ..plan }, "", &mut |_| ()).unwrap_err();
+        assert_eq!(refused.to_string(), "network: it has 16 electrodes, but display-140x70 has 32");
     }
 
     #[test]

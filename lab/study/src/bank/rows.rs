@@ -120,7 +120,7 @@ pub(super) fn rows(case: &Case, solver: &str, trials: &[&Trial]) -> Vec<Row> {
     let of_radii_mm =
         |range: std::ops::Range<f64>| move |contact: &TrueContact| range.contains(&(1e3 * contact.scaled_radius_m));
     let by_count = (1..).zip(COUNTS).map(|(count, class)| of_scenes(class, &|t| t.judged.truth.len() == count));
-    let by_kind = case.scenes.kinds().iter().map(|kind| of_scenes(kind, &|trial| trial.kind == Some(*kind)));
+    let by_kind = case.kinds().iter().map(|kind| of_scenes(kind, &|trial| trial.kind == Some(*kind)));
     let others = [
         of_scenes("all", &|_| true),
         of_scenes("contrast above 100", &|trial| trial.judged.contrast() > CONTRAST),
