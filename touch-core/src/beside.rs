@@ -13,6 +13,7 @@ use crate::real::Real;
 use crate::scan::{APART, Candidate, Candidates, places, take};
 use crate::solver::Task;
 use crate::table::{MAX_ELECTRODES, Table};
+use crate::unknown::Detector;
 use crate::vector::{PARAMETERS, Vector};
 
 /// Damping of the normal equations in what contacts that are there could do as well, and share of a pattern that is taken for new at least: the host's.
@@ -25,7 +26,7 @@ const A_PIECE: usize = 40;
 /// Takes the places among some where one more contact would explain most of what contacts that are fitted leave of a frame among the best, and counts the looks;
 /// returns the number of the place to go on at, if there is one. None are taken where the contacts are not determined.
 pub(crate) fn beside<T: Real, const K: usize>(
-    Task { table, frame, errors }: Task<'_, T>,
+    Task { table, frame, errors, .. }: Task<'_, T>,
     circuit: &Circuit<T, K>,
     normal: &Normal<T, K>,
     from: usize,
@@ -39,7 +40,7 @@ pub(crate) fn beside<T: Real, const K: usize>(
     let mut beside = Beside { table, circuit, factor, weight, rows: [Row::NONE; MAX_ELECTRODES] };
     let mut volts = [T::ZERO; MAX_ELECTRODES];
     for (g, row) in beside.rows.iter_mut().enumerate().take(n) {
-        circuit.row_v(table, g, &mut volts);
+        circuit.row_v(&Detector::described(table), g, &mut volts);
         row.take((frame, errors), g, (T::of(head.drive_v), T::of(head.full_v)), &volts[..n]);
         row.slopes = RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m));
         row.sum_up(circuit, g, T::of(head.radius_m), n);
@@ -180,7 +181,7 @@ impl<T: Real, const K: usize> Beside<'_, '_, T, K> {
             looks += 1;
             work.looked();
             let own_ohm = table.rough(i, j, &mut fields_ohm);
-            self.circuit.potentials_ohm(table, at_m, &fields_ohm, &mut potentials_ohm);
+            self.circuit.potentials_ohm(&Detector::described(table), at_m, &fields_ohm, &mut potentials_ohm);
             let (along, square) = self.look(&potentials_ohm[..table.electrodes()]);
             if along > T::ZERO && square > T::ZERO {
                 let ln_ohm = held_ohm(((square / along).max(own_ohm)).ln(), table);

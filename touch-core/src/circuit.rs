@@ -24,6 +24,7 @@ use crate::fields::Sample;
 use crate::head::Head;
 use crate::real::Real;
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, Table};
+use crate::unknown::Detector;
 use crate::vector::PARAMETERS;
 
 /// By what share that of a disc of even potential, `1 / (4 s R)`, is less.
@@ -102,7 +103,7 @@ pub(crate) struct Loaded<T> {
     /// Derivatives of the electrodes' fields by the logarithm of the radius (ohm).
     pub by_radius_ohm: PerElectrode<T>,
     /// `Q b` of its place.
-    walls_ohm: [T; MAX_ELECTRODES + 1],
+    pub walls_ohm: [T; MAX_ELECTRODES + 1],
     /// Resistance with that of the crowded current (ohm).
     pub ohm: T,
     /// Part of it that is on the detector.
@@ -147,13 +148,13 @@ impl<T: Real> Loaded<T> {
     };
 
     /// Puts a contact there.
-    fn load(&mut self, table: &Table<'_>, spot: Spot<T>) {
-        let (head, n) = (table.head(), table.electrodes());
+    fn load(&mut self, detector: &Detector<'_, T>, spot: Spot<T>) {
+        let (head, n) = (detector.table.head(), detector.table.electrodes());
         let spread_m = T::of(head.radius_m) * spot.ln_radius.exp();
         let [small_m2, wide_m2] = head.radii_m.map(|radius_m| T::of(radius_m) * T::of(radius_m));
         let per_m2 = T::ONE / (wide_m2 - small_m2);
         self.spot = spot;
-        table.sample(spot.at_m, per_m2 * (spread_m * spread_m - small_m2), &mut self.sample);
+        detector.sample(spot.at_m, per_m2 * (spread_m * spread_m - small_m2), &mut self.sample);
         self.share = self.sample.value[n + 1].clamp(T::of(LEAST_SHARE), T::ONE);
         self.ohm = spot.ln_ohm.exp().max(T::of(LEAST_OHM) * (self.sample.value[n] + head.even_ohm(spread_m)));
         self.per_ln_radius = T::of(2.0) * per_m2 * spread_m * spread_m;
@@ -161,7 +162,7 @@ impl<T: Real> Loaded<T> {
         for e in 0..n {
             self.by_radius_ohm[e] = self.per_ln_radius * self.sample.wider[e];
         }
-        table.by_walls(&self.sample.value[..n], &mut self.walls_ohm);
+        detector.by_walls(&self.sample.value[..n], &mut self.walls_ohm);
     }
 
     /// Finds how the current crowds, and what moment a slope drives.
@@ -196,6 +197,11 @@ impl<T: Real> Loaded<T> {
     /// Conductance (S), with that of the part that is not on the detector.
     pub fn conductance_s(&self) -> T {
         T::ONE / (self.share * self.rest_ohm)
+    }
+
+    /// Logarithm of the resistance with that of the crowded current over that without it.
+    pub fn ln_over_contact(&self) -> T {
+        (self.ohm / self.rest_ohm).ln()
     }
 
     /// Variance of the conductance's logarithm, from the covariance of the contact's parameters with places in so many metres.
@@ -234,10 +240,10 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     };
 
     /// Solves for some contacts, `K` at most; `false` if their fields cannot be those of contacts, as when two are at one place.
-    pub fn solve(&mut self, table: &Table<'_>, spots: &[Spot<T>]) -> bool {
+    pub fn solve(&mut self, detector: &Detector<'_, T>, spots: &[Spot<T>]) -> bool {
         self.count = spots.len().min(K);
         for (loaded, spot) in self.loaded.iter_mut().zip(spots) {
-            loaded.load(table, *spot);
+            loaded.load(detector, *spot);
         }
         let mut matrix = [[T::ZERO; K]; K];
         // Derivatives of the field at contact k from contact l, by the place of k.
@@ -245,23 +251,23 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         for k in 0..self.count {
             matrix[k][k] = self.loaded[k].ohm;
             for l in (0..self.count).filter(|l| *l != k) {
-                let (ohm, slope) = self.between(table, k, l);
+                let (ohm, slope) = self.between(detector, k, l);
                 (matrix[k][l], slopes[k][l]) = (ohm, slope);
             }
         }
-        self.find_currents(table, &matrix) && {
-            self.find_slopes(table, &slopes);
-            self.find_loads(table)
+        self.find_currents(detector.table, &matrix) && {
+            self.find_slopes(detector.table, &slopes);
+            self.find_loads(detector)
         }
     }
 
     /// Field of contact `l` at contact `k` (ohm), and its derivatives by the place of `k` (ohm/m).
-    fn between(&self, table: &Table<'_>, k: usize, l: usize) -> (T, [T; 2]) {
+    fn between(&self, detector: &Detector<'_, T>, k: usize, l: usize) -> (T, [T; 2]) {
         let (at, from) = (&self.loaded[k], &self.loaded[l]);
-        let n = table.electrodes();
+        let n = detector.table.electrodes();
         let way_m = [0, 1].map(|d| at.spot.at_m[d] - from.spot.at_m[d]);
         let distance_m = (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt().max(T::of(1e-9));
-        let (mut ohm, per_m) = table.by_distance_ohm(distance_m);
+        let (mut ohm, per_m) = detector.by_distance_ohm(distance_m);
         let mut slope = way_m.map(|way_m| per_m * way_m / distance_m);
         ohm += from.walls_ohm[n];
         for e in 0..n {
@@ -327,9 +333,9 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         }
     }
 
-    fn find_loads(&mut self, table: &Table<'_>) -> bool {
-        for g in 0..table.electrodes() {
-            let mut ohm = T::of(table.pads_ohm(g, g)) - self.constant_ohm[g] + T::of(table.head().on_resistance_ohm);
+    fn find_loads(&mut self, detector: &Detector<'_, T>) -> bool {
+        for g in 0..detector.table.electrodes() {
+            let mut ohm = detector.pads_ohm(g, g) - self.constant_ohm[g] + detector.switch_ohm();
             for one in &self.loaded[..self.count] {
                 let [x, y] = [0, 1].map(|d| one.driving_ohm_per_m[d][g]);
                 ohm -= one.sample.value[g] * one.currents[g] + one.moment_s_m2 * (x * x + y * y);
@@ -342,14 +348,13 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         true
     }
 
-    /// The readings with one electrode grounded (V).
-    pub fn row_v(&self, table: &Table<'_>, g: usize, volts: &mut PerElectrode<T>) {
-        let head = table.head();
-        let (own_ohm, per_ohm) =
-            (T::of(table.pads_ohm(g, g)) + T::of(head.on_resistance_ohm), T::of(head.drive_v) / self.loads_ohm[g]);
+    /// What is there to be read while an electrode is grounded (V).
+    pub fn row_v(&self, detector: &Detector<'_, T>, g: usize, volts: &mut [T]) {
+        let own_ohm = detector.pads_ohm(g, g) + detector.switch_ohm();
+        let per_ohm = T::of(detector.table.head().drive_v) / self.loads_ohm[g];
         // Differences, so that the resistance of a light contact, thousands of times as much, does not take their digits.
-        for (e, volts) in volts.iter_mut().enumerate().take(table.electrodes()) {
-            let mut ohm = own_ohm - T::of(table.pads_ohm(e, g));
+        for (e, volts) in volts.iter_mut().enumerate().take(detector.table.electrodes()) {
+            let mut ohm = own_ohm - detector.pads_ohm(e, g);
             for one in &self.loaded[..self.count] {
                 let along = |d: usize| {
                     let here = one.driving_ohm_per_m[d][g];
@@ -365,12 +370,12 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     /// Potentials under a place without a contact, for 1 A into each electrode (ohm), from the fields there.
     pub fn potentials_ohm(
         &self,
-        table: &Table<'_>,
+        detector: &Detector<'_, T>,
         at_m: [T; 2],
         fields_ohm: &PerElectrode<T>,
         all_ohm: &mut PerElectrode<T>,
     ) {
-        let n = table.electrodes();
+        let n = detector.table.electrodes();
         for e in 0..n {
             all_ohm[e] = fields_ohm[e] - self.constant_ohm[e];
         }
@@ -378,7 +383,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
             let way_m = [0, 1].map(|d| at_m[d] - one.spot.at_m[d]);
             let distance_m = (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt();
             let by_walls: T = (0..n).map(|e| one.walls_ohm[e] * fields_ohm[e]).sum();
-            let ohm = table.by_distance_ohm(distance_m).0 + by_walls + one.walls_ohm[n];
+            let ohm = detector.by_distance_ohm(distance_m).0 + by_walls + one.walls_ohm[n];
             (0..n).for_each(|e| all_ohm[e] -= ohm * one.currents[e]);
         }
     }

@@ -3,7 +3,7 @@
 use crate::circuit::TURNED;
 use crate::head::Head;
 use crate::real::Real;
-use crate::spline::{interval, weights};
+use crate::spline::weights;
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, OTHERS, QUANTITIES, RADII, Table};
 
 /// All quantities of a disc.
@@ -138,24 +138,20 @@ impl<'a> Table<'a> {
         [middle(left_m, i, step_x_m), middle(bottom_m, j, step_y_m)]
     }
 
-    /// The part of the field between places that goes by their distance (m): its value (ohm), and its derivative by that (ohm/m).
-    pub(crate) fn by_distance_ohm<T: Real>(&self, distance_m: T) -> (T, T) {
-        let (near_m, ln_step) = (T::of(self.head.near_m), T::of(self.head.ln_step));
-        // Nearer than that there is no second contact.
-        let distance_m = distance_m.max(near_m);
-        let (first, t) = interval((distance_m / near_m).ln() / ln_step, self.distances.0.len() - 3);
-        let weights = weights(t);
-        let sum = |weights: &[T; 4]| (0..4).map(|k| weights[k] * T::of(self.distances.at(first + k))).sum::<T>();
-        (sum(&weights.value), sum(&weights.slope) / (ln_step * distance_m))
+    /// Coefficients over distances.
+    pub(crate) fn knots(&self) -> usize {
+        self.distances.0.len()
     }
 
-    /// `Q b` of the fields at a place.
-    pub(crate) fn by_walls<T: Real>(&self, fields_ohm: &[T], products: &mut [T; MAX_ELECTRODES + 1]) {
-        let n = self.electrodes;
-        for (row, product) in products.iter_mut().enumerate().take(n + 1) {
-            let walls = |s: usize| T::of(self.walls.of_pair(row, s));
-            let sum: T = fields_ohm.iter().take(n).enumerate().map(|(s, u)| walls(s) * *u).sum();
-            *product = sum + walls(n);
+    /// A coefficient over distances (ohm).
+    pub(crate) fn distance_ohm(&self, knot: usize) -> f32 {
+        self.distances.at(knot)
+    }
+
+    /// Its fields between electrodes, the spline over distances, and `Q`, as numbers.
+    pub(crate) fn parts<T: Real>(&self, parts: [&mut [T]; 3]) {
+        for (part, floats) in parts.into_iter().zip([self.pads, self.distances, self.walls]) {
+            part.iter_mut().enumerate().for_each(|(index, value)| *value = T::of(floats.at(index)));
         }
     }
 }

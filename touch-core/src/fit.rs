@@ -1,36 +1,42 @@
 //! Damped Gauss-Newton steps of contacts to the readings of a frame, one look at them at a time.
 
 use crate::circuit::{Circuit, Spot};
+use crate::evidence::ln_volume;
+use crate::held::Room;
 use crate::normal::Normal;
 use crate::real::Real;
+use crate::round::OnUnknown;
 use crate::solver::{BOARD_CONTACTS, Task};
 use crate::table::Table;
+use crate::unknown::Detector;
 use crate::vector::Vector;
 
 /// Longest way in a step, in usual radii, and longest change of a logarithm.
 const LONGEST_WAY: f32 = 2.0;
 const LONGEST_LOG: f32 = 1.0;
 /// A step that gains less than this (squared deviations) in the linear theory is not worth it: it moves nothing by a third of its standard error.
-const LEAST_GAIN: f32 = 0.1;
+pub(crate) const LEAST_GAIN: f32 = 0.1;
 /// Damping at the start, shares of the diagonal, and how it changes with a step that is taken or not; steps tried from a place.
 const FIRST_DAMPING: f32 = 1e-3;
 const LEAST_DAMPING: f32 = 1e-5;
 const DAMPING_STEP: f32 = 10.0;
-const TRIES: u8 = 4;
+pub(crate) const TRIES: u8 = 4;
 /// Radii, as logarithms over the usual one: from a fifth of it to three times it.
 pub(crate) const LN_RADII: [f32; 2] = [-1.6, 1.1];
 /// Resistances, as logarithms of those of a square of the layer: a contact of 1e-6 squares is nothing, and none leads better than a fifth of one.
 pub(crate) const LN_SQUARES: [f32; 2] = [-3.0, 13.8];
 
-/// Contacts of a scene, `K` at most.
+/// Contacts of a scene, `K` at most, and the detector that they are on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Scene<T, const K: usize> {
+pub(crate) struct Scene<T, const K: usize, const D: usize> {
     pub count: usize,
     pub spots: [Spot<T>; K],
+    /// Steps from what the detector's table says in the directions that are not known, in deviations.
+    pub steps: [T; D],
 }
 
-impl<T: Real, const K: usize> Scene<T, K> {
-    pub const EMPTY: Self = Self { count: 0, spots: [Spot::NONE; K] };
+impl<T: Real, const K: usize, const D: usize> Scene<T, K, D> {
+    pub const EMPTY: Self = Self { count: 0, spots: [Spot::NONE; K], steps: [T::ZERO; D] };
 
     pub fn spots(&self) -> &[Spot<T>] {
         &self.spots[..self.count.min(K)]
@@ -45,13 +51,25 @@ impl<T: Real, const K: usize> Scene<T, K> {
         self
     }
 
+    /// A scene so far on the way to another one of as many contacts.
+    pub fn towards(mut self, to: &Self, share: T) -> Self {
+        let between = |from: &mut T, to: T| *from += share * (to - *from);
+        for (spot, to) in self.spots.iter_mut().zip(&to.spots).take(self.count) {
+            spot.at_m.iter_mut().zip(to.at_m).for_each(|(from, to)| between(from, to));
+            between(&mut spot.ln_ohm, to.ln_ohm);
+            between(&mut spot.ln_radius, to.ln_radius);
+        }
+        self.steps.iter_mut().zip(to.steps).for_each(|(from, to)| between(from, to));
+        self
+    }
+
     /// The scene without one.
     pub fn without(self, index: usize) -> Self {
         let kept = self.spots().iter().enumerate().filter(|(k, _)| *k != index);
-        kept.fold(Self::EMPTY, |scene, (_, spot)| scene.with(*spot))
+        kept.fold(Self { steps: self.steps, ..Self::EMPTY }, |scene, (_, spot)| scene.with(*spot))
     }
 
-    fn moved(&self, step: &Vector<T, K>, table: &Table<'_>) -> Self {
+    pub fn moved(&self, step: &Vector<T, K>, table: &Table<'_>) -> Self {
         let mut moved = *self;
         let head = table.head();
         for (spot, step) in moved.spots.iter_mut().zip(&step.0).take(self.count) {
@@ -85,7 +103,7 @@ pub(crate) struct Working<'a, const K: usize> {
 
 impl<const K: usize> Working<'_, K> {
     /// The readings of so many contacts and their derivatives were worked out.
-    fn worked_out(&mut self, contacts: usize) {
+    pub fn worked_out(&mut self, contacts: usize) {
         self.done.frames[contacts - 1] += 1;
         (self.attend)();
     }
@@ -126,11 +144,13 @@ impl<const K: usize> Default for Work<K> {
 
 /// Contacts that were fitted to a frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Fit<T, const K: usize> {
-    pub scene: Scene<T, K>,
-    /// Sum of squares of what they leave, and the same with what was known of radii before.
+pub(crate) struct Fit<T, const K: usize, const D: usize> {
+    pub scene: Scene<T, K, D>,
+    /// Sum of squares of what they leave and of the detector's steps, and the same with what was known of radii before.
     pub cost: T,
     pub objective: T,
+    /// Twice the logarithm of the evidence for them, less all that is the same for all explanations.
+    pub evidence: T,
     /// What the readings say for each contact (squared deviations).
     pub information: [T; K],
     /// Standard deviation of the logarithms of radii that they were fitted with.
@@ -139,12 +159,13 @@ pub(crate) struct Fit<T, const K: usize> {
     pub is_alone: bool,
 }
 
-impl<T: Real, const K: usize> Fit<T, K> {
+impl<T: Real, const K: usize, const D: usize> Fit<T, K, D> {
     /// No contact.
     pub const NONE: Self = Self {
         scene: Scene::EMPTY,
         cost: T::ZERO,
         objective: T::ZERO,
+        evidence: T::ZERO,
         information: [T::ZERO; K],
         radius_deviation: T::ZERO,
         is_alone: false,
@@ -153,30 +174,39 @@ impl<T: Real, const K: usize> Fit<T, K> {
 
 /// How a fit goes on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Went<T, const K: usize> {
+pub(crate) enum Went<T, const K: usize, const D: usize> {
     /// It has not ended.
     On,
     /// It has ended: with this, or with nothing if the scene makes no sense.
-    ToEnd(Option<Fit<T, K>>),
+    ToEnd(Option<Fit<T, K, D>>),
+}
+
+/// What a fit works with.
+pub(crate) struct Bench<'a, 'm, T, const K: usize> {
+    pub circuit: &'a mut Circuit<T, K>,
+    /// Where a detector that is not known is worked out.
+    pub room: Option<&'a mut Room<'m, T>>,
 }
 
 /// A fit under way.
 #[derive(Clone, Debug)]
-pub(crate) struct Fitting<T, const K: usize> {
-    scene: Scene<T, K>,
+pub(crate) struct Fitting<T, const K: usize, const D: usize> {
+    pub(crate) scene: Scene<T, K, D>,
     /// Of the scene.
     pub normal: Normal<T, K>,
     /// What is looked at next.
-    trial: Scene<T, K>,
-    radius_deviation: T,
-    damping: T,
+    trial: Scene<T, K, D>,
+    pub(crate) radius_deviation: T,
+    pub(crate) damping: T,
     /// Steps that it may still take, and tries of the next one so far.
-    steps: u8,
+    pub(crate) steps: u8,
     tries: u8,
-    has_looked: bool,
+    pub(crate) has_looked: bool,
+    /// What is not known of a detector.
+    pub(crate) on: OnUnknown<T, D>,
 }
 
-impl<T: Real, const K: usize> Fitting<T, K> {
+impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     /// One that has nothing to do.
     pub const NONE: Self = Self {
         scene: Scene::EMPTY,
@@ -187,30 +217,42 @@ impl<T: Real, const K: usize> Fitting<T, K> {
         steps: 0,
         tries: 0,
         has_looked: false,
+        on: OnUnknown::NONE,
     };
 
     /// Begins to step from a scene to where it fits best, so many steps at most.
-    pub fn begin(&mut self, scene: Scene<T, K>, radius_deviation: T, steps: u8) {
+    pub fn begin(&mut self, scene: Scene<T, K, D>, radius_deviation: T, steps: u8) {
+        self.on.is_held &= scene == self.scene;
         (self.scene, self.trial, self.radius_deviation) = (scene, scene, radius_deviation);
         (self.damping, self.steps, self.tries, self.has_looked) = (T::of(FIRST_DAMPING), steps, 0, false);
     }
 
-    /// Takes one look.
-    pub fn go_on(&mut self, task: Task<'_, T>, circuit: &mut Circuit<T, K>, work: &mut Working<'_, K>) -> Went<T, K> {
+    /// Takes one look; where the detector is not known, goes one round.
+    pub fn go_on(
+        &mut self,
+        task: Task<'_, T>,
+        bench: &mut Bench<'_, '_, T, K>,
+        work: &mut Working<'_, K>,
+    ) -> Went<T, K, D> {
+        if D > 0
+            && let (Some(unknown), Some(room)) = (task.unknown, &mut bench.room)
+        {
+            return self.go_round(task, unknown, bench.circuit, room, work);
+        }
         if !self.has_looked {
             self.has_looked = true;
-            if !look(task, circuit, &self.trial, self.radius_deviation, &mut self.normal, work) {
+            if !look(task, bench.circuit, &self.trial, self.radius_deviation, &mut self.normal, work) {
                 return Went::ToEnd(None);
             }
         } else {
             let mut normal = Normal::EMPTY;
-            let makes_sense = look(task, circuit, &self.trial, self.radius_deviation, &mut normal, work);
+            let makes_sense = look(task, bench.circuit, &self.trial, self.radius_deviation, &mut normal, work);
             if makes_sense && normal.objective() < self.normal.objective() {
                 (self.scene, self.normal) = (self.trial, normal);
-                self.damping = (self.damping / T::of(DAMPING_STEP)).max(T::of(LEAST_DAMPING));
+                self.is_better();
                 (self.steps, self.tries) = (self.steps - 1, 0);
             } else {
-                self.damping *= T::of(DAMPING_STEP);
+                self.is_worse();
                 self.tries += 1;
             }
         }
@@ -220,15 +262,27 @@ impl<T: Real, const K: usize> Fitting<T, K> {
                 self.trial = self.scene.moved(&step, task.table);
                 Went::On
             }
-            None => Went::ToEnd(Some(self.fit())),
+            None => Went::ToEnd(Some(self.fit(task, bench.circuit))),
         }
     }
 
-    fn fit(&self) -> Fit<T, K> {
+    /// A step was taken: the next one is damped less.
+    pub(crate) fn is_better(&mut self) {
+        self.damping = (self.damping / T::of(DAMPING_STEP)).max(T::of(LEAST_DAMPING));
+    }
+
+    /// It was not.
+    pub(crate) fn is_worse(&mut self) {
+        self.damping *= T::of(DAMPING_STEP);
+    }
+
+    fn fit(&self, task: Task<'_, T>, circuit: &Circuit<T, K>) -> Fit<T, K, D> {
+        let (cost, objective) = (self.normal.cost, self.normal.objective());
         Fit {
             scene: self.scene,
-            cost: self.normal.cost,
-            objective: self.normal.objective(),
+            cost,
+            objective,
+            evidence: ln_volume(task.table, circuit, &self.normal) * T::of(2.0) - objective,
             information: self.normal.information(),
             radius_deviation: self.radius_deviation,
             is_alone: false,
@@ -237,18 +291,19 @@ impl<T: Real, const K: usize> Fitting<T, K> {
 }
 
 /// What a scene leaves of a frame; `false` if it makes no sense.
-fn look<T: Real, const K: usize>(
-    Task { table, frame, errors }: Task<'_, T>,
+fn look<T: Real, const K: usize, const D: usize>(
+    Task { table, frame, errors, .. }: Task<'_, T>,
     circuit: &mut Circuit<T, K>,
-    scene: &Scene<T, K>,
+    scene: &Scene<T, K, D>,
     radius_deviation: T,
     normal: &mut Normal<T, K>,
     work: &mut Working<'_, K>,
 ) -> bool {
-    if scene.count == 0 || !circuit.solve(table, scene.spots()) {
+    let detector = Detector::described(table);
+    if scene.count == 0 || !circuit.solve(&detector, scene.spots()) {
         return false;
     }
-    normal.sum_up(table, circuit, frame, errors, radius_deviation);
+    normal.sum_up(&detector, circuit, frame, errors, radius_deviation, None);
     work.worked_out(scene.count);
     normal.objective().is_finite()
 }

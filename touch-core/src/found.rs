@@ -2,7 +2,7 @@
 
 use std::vec::Vec;
 
-use crate::fit::{Fitting, Went};
+use crate::fit::{Bench, Fitting, Went};
 use crate::frame::Errors;
 use crate::laws::{ALL, solved, summed, tables};
 use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
@@ -10,11 +10,12 @@ use crate::samples::{CELLS, grid_m, table, table_of};
 use crate::scan::{Candidate, Candidates, first, no_candidates};
 use crate::solver::Task;
 use crate::tests::{Circuit, Fit, Scene, Spot, noisy, spot, volts};
+use crate::unknown::Detector;
 use crate::vector::PARAMETERS;
 use crate::{Flags, Frame, Says, Solver, Table};
 
-type Search = crate::search::Search<f32, 3>;
-type Wants = crate::search::Wants<f32, 3>;
+type Search = crate::search::Search<f32, 3, 0>;
+type Wants = crate::search::Wants<f32, 3, 0>;
 const MOST_PIECES: u32 = <Solver>::MOST_PIECES;
 
 #[test]
@@ -34,7 +35,7 @@ fn a_first_contact_is_where_it_is_for_any_number_of_electrodes_and_they_may_be_c
                 let (mut done, mut calls) = (<crate::Work>::default(), 0);
                 let mut attend = || calls += 1;
                 let mut work = crate::fit::Working { done: &mut done, attend: &mut attend };
-                let found = first(Task { table: &table, frame: &frame, errors: &errors }, &mut work)[0];
+                let found = first(Task { table: &table, frame: &frame, errors: &errors, unknown: None }, &mut work)[0];
                 let off_m = (found.spot.at_m[0] - alone.at_m[0]).hypot(found.spot.at_m[1] - alone.at_m[1]);
                 assert!(off_m < 0.006 && (found.spot.ln_ohm - alone.ln_ohm).abs() < 0.1, "{n}: {found:?}");
                 assert!(calls >= 100 && calls == done.first_looks);
@@ -363,17 +364,18 @@ fn one_more_is_looked_for_where_it_is_missing() {
         (6 * n..7 * n).for_each(|i| says[i] = Says::AtLeast);
         let frame = Frame::new(&read, &says);
         let errors = Errors::of(&frame, &table);
-        let task = Task { table: &table, frame: &frame, errors: &errors };
+        let task = Task { table: &table, frame: &frame, errors: &errors, unknown: None };
         // The one that is there is fitted as well as it goes by itself.
         let (mut circuit, mut fitting, mut looks) = (Circuit::EMPTY, Fitting::NONE, <crate::Work>::default());
         fitting.begin(Scene::EMPTY.with(there), ANY_RADIUS, 20);
         let alone = loop {
             let mut work = crate::fit::Working { done: &mut looks, attend: &mut || () };
-            if let Went::ToEnd(found) = fitting.go_on(task, &mut circuit, &mut work) {
+            if let Went::ToEnd(found) = fitting.go_on(task, &mut Bench { circuit: &mut circuit, room: None }, &mut work)
+            {
                 break found.unwrap();
             }
         };
-        assert!(circuit.solve(&table, alone.scene.spots()));
+        assert!(circuit.solve(&Detector::described(&table), alone.scene.spots()));
         let normal = fitting.normal;
         let (mut done, mut best, mut from, mut pieces) = (<crate::Work>::default(), no_candidates(), Some(0), 0);
         while let Some(at) = from {

@@ -6,6 +6,7 @@ use crate::frame::{Errors, left_v};
 use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
 use crate::samples::{CELLS, field_ohm, fields_ohm, grid_m, table, table_of};
 use crate::tests::{Circuit, Normal, Spot, spot, volts};
+use crate::unknown::Detector;
 use crate::vector::PARAMETERS;
 use crate::{Frame, Says, Table};
 
@@ -52,7 +53,7 @@ fn between_ohm(table: &Table<'_>, fields: [&[f64]; 2], way_m: f32) -> f64 {
     let n = table.electrodes();
     let pairs = (0..=n).flat_map(|s| (0..=n).map(move |t| (s, t)));
     let by_walls: f64 = pairs.map(|(s, t)| fields[0][s] * f64::from(table.walls.of_pair(s, t)) * fields[1][t]).sum();
-    f64::from(table.by_distance_ohm(way_m).0) + by_walls
+    f64::from(Detector::described(table).by_distance_ohm(way_m).0) + by_walls
 }
 
 /// Readings by Kirchhoff's laws: contacts and couples of currents are nodes, all equations are solved at once.
@@ -130,7 +131,7 @@ fn readings_are_those_of_all_equations_solved_at_once() {
             &[wide, spot(0.013, 0.01, 8.0), spot(0.001, -0.009, 0.3)],
         ] {
             let mut circuit = Circuit::EMPTY;
-            assert!(circuit.solve(&table, spots));
+            assert!(circuit.solve(&Detector::described(&table), spots));
             let (found, expected) = (volts(&table, spots), dense_v(&table, &circuit));
             let largest_v = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));
             let off_v = found.iter().zip(&expected).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
@@ -150,7 +151,7 @@ fn moments_are_those_of_discs_that_are_known() {
         let table = Table::read(&bytes).unwrap();
         let mut circuit = Circuit::EMPTY;
         assert!(circuit.solve(
-            &table,
+            &Detector::described(&table),
             &[Spot {
                 ln_radius,
                 ln_ohm: if sheets > 1e3 { 0.0 } else { spot(0.0, 0.0, sheets).ln_ohm },
@@ -178,7 +179,7 @@ fn moments_and_conductances_change_with_the_parameters_as_their_derivatives_say(
     let table = Table::read(&bytes).unwrap();
     let loaded = |spot: Spot| {
         let mut circuit = Circuit::EMPTY;
-        assert!(circuit.solve(&table, &[spot]));
+        assert!(circuit.solve(&Detector::described(&table), &[spot]));
         circuit.loaded[0].clone()
     };
     for (at_m, sheets, ln_radius) in
@@ -273,19 +274,22 @@ fn fields_are_those_of_the_sheet_and_their_derivatives_their_differences() {
             }
         }
         // Between places by distance.
-        let between = |at_m: [f32; 2]| table.by_distance_ohm(at_m[0].hypot(at_m[1])).0;
+        let between = |at_m: [f32; 2]| Detector::described(&table).by_distance_ohm(at_m[0].hypot(at_m[1])).0;
         let apart = |at_m: [f32; 2]| field_ohm([0.0; 2], at_m);
         let [far, near] = [[0.03, 0.01], [0.006, 0.002]];
         assert!(((between(far) - between(near)) / (apart(far) - apart(near)) - 1.0).abs() < 0.2);
-        let per_m = (table.by_distance_ohm(0.0101).0 - table.by_distance_ohm(0.0099).0) / 2e-4;
-        assert!((table.by_distance_ohm(0.01f32).1 / per_m - 1.0).abs() < 0.01);
+        let per_m = (Detector::described(&table).by_distance_ohm(0.0101).0
+            - Detector::described(&table).by_distance_ohm(0.0099).0)
+            / 2e-4;
+        assert!((Detector::described(&table).by_distance_ohm(0.01f32).1 / per_m - 1.0).abs() < 0.01);
     }
 }
 
 pub(crate) fn summed(table: &Table<'_>, frame: &Frame<'_>, spots: &[Spot], deviation: f32) -> Normal {
     let (mut circuit, mut normal) = (Circuit::EMPTY, Normal::EMPTY);
-    assert!(circuit.solve(table, spots));
-    normal.sum_up(table, &circuit, frame, &Errors::of(frame, table), deviation);
+    let detector = Detector::described(table);
+    assert!(circuit.solve(&detector, spots));
+    normal.sum_up(&detector, &circuit, frame, &Errors::of(frame, table), deviation, None);
     normal
 }
 

@@ -22,19 +22,24 @@ extern crate std;
 
 mod answer;
 mod beside;
+mod births;
 mod circuit;
 mod contents;
 mod crc;
+mod evidence;
 mod fields;
 mod fit;
 #[cfg(test)]
 mod found;
 mod frame;
 mod head;
+mod held;
 #[cfg(test)]
 mod laws;
 mod normal;
+mod patterns;
 mod real;
+mod round;
 #[cfg(test)]
 mod samples;
 mod scan;
@@ -44,12 +49,16 @@ pub mod spline;
 pub mod table;
 #[cfg(test)]
 mod tests;
+mod unknown;
 mod vector;
 
 pub use self::answer::{Answer, Contact, Flags};
 pub use self::contents::Contents;
 pub use self::fit::Work;
 pub use self::frame::{Frame, FrameError, Says};
+pub use self::held::Room;
 pub use self::real::Real;
+
 pub use self::solver::{BOARD_CONTACTS, Solver};
 pub use self::table::{MAX_ELECTRODES, Table, TableError};
+pub use self::unknown::{Change, Direction, Unknown};

@@ -2,8 +2,10 @@
 
 use crate::circuit::{Circuit, Loaded, TURNED};
 use crate::frame::{Errors, Frame, Says, left_v};
+use crate::held::{Held, dot};
 use crate::real::Real;
-use crate::table::{MAX_ELECTRODES, Table};
+use crate::table::MAX_ELECTRODES;
+use crate::unknown::Detector;
 use crate::vector::{Matrix, PARAMETERS, Vector};
 
 /// Which parameter of a contact is that of its resistance.
@@ -38,28 +40,39 @@ impl<T: Real, const K: usize> Normal<T, K> {
     ///
     /// An error of a grounded pad's own impedance changes its row by `p`, so that the row's covariance is `v I + p p'`, whose inverse is
     /// `(I - p p' / (v + p'p)) / v` (Sherman and Morrison, 1950).
+    /// What is not known of the detector is in the covariance too where its patterns are held, of which so many count.
     pub fn sum_up(
         &mut self,
-        table: &Table<'_>,
+        detector: &Detector<'_, T>,
         circuit: &Circuit<T, K>,
         frame: &Frame<'_, T>,
         errors: &Errors<T>,
         radius_deviation: T,
+        mut held: Option<(&mut Held<'_, T>, usize)>,
     ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
-        let (head, n) = (table.head(), table.electrodes());
+        let (table, head, n) = (detector.table, detector.table.head(), detector.table.electrodes());
+        let noise_v = errors.variance_v2.sqrt();
+        if let Some((held, count)) = &mut held {
+            held.begin(*count, self.count);
+        }
         let mut volts = [T::ZERO; MAX_ELECTRODES];
         for g in 0..n {
-            circuit.row_v(table, g, &mut volts);
+            circuit.row_v(detector, g, &mut volts);
             let (mut by_pad, mut left_by_pad, mut pad) = (Vector::<T, K>::ZERO, T::ZERO, T::ZERO);
             let slopes = RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m));
             for e in 0..n {
                 let index = g * n + e;
-                let Some(left_v) = left_v(frame, index, T::of(head.full_v), volts[e]) else { continue };
+                let read_v = detector.read_v(e, volts[e]);
+                let Some(mut left_v) = left_v(frame, index, T::of(head.full_v), read_v) else { continue };
                 let mut slope = Vector::<T, K>::ZERO;
                 for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
                     let pattern = Pattern::of(one, T::of(head.radius_m), |values| values[e]);
                     slopes.add(circuit, k, &pattern, T::ONE - volts[e] / T::of(head.drive_v), &mut slope);
+                }
+                if let Some((held, count)) = &mut held {
+                    slope.iter_mut().for_each(|slope| *slope *= detector.gain(e));
+                    left_v += noise_v * held.add(index, *count, noise_v, left_v, &slope[..self.count]);
                 }
                 if frame.says_at(index) != Says::AtMost {
                     let by_strength = slope.iter().skip(STRENGTH).step_by(PARAMETERS);
@@ -87,7 +100,24 @@ impl<T: Real, const K: usize> Normal<T, K> {
             }
         }
         self.weigh(T::ONE / errors.variance_v2);
+        if let Some((held, count)) = held {
+            self.leave_out(held, count, T::ONE / noise_v);
+        }
         self.add_known(circuit, radius_deviation);
+    }
+
+    /// Takes what steps of the detector could do as well from all sums.
+    fn leave_out(&mut self, held: &mut Held<'_, T>, count: usize, scale: T) {
+        held.project(count, self.count, scale);
+        let (of_left, columns) = held.projected(count);
+        self.cost -= dot(of_left, of_left);
+        for i in 0..self.count {
+            let column = &columns[i * count..(i + 1) * count];
+            self.pull[i] -= dot(column, of_left);
+            for j in 0..=i {
+                self.matrix[i][j] -= dot(column, &columns[j * count..(j + 1) * count]);
+            }
+        }
     }
 
     fn weigh(&mut self, weight: T) {
@@ -112,6 +142,14 @@ impl<T: Real, const K: usize> Normal<T, K> {
     /// What is to become least.
     pub fn objective(&self) -> T {
         self.cost + self.known
+    }
+
+    /// Logarithm of the determinant of the normal matrix with a prior of these weights of a contact's parameters; `None` where they are not determined.
+    pub fn ln_determinant(&self, weights: [T; PARAMETERS]) -> Option<T> {
+        let mut all = *self;
+        (0..self.count).for_each(|i| all.matrix[i][i] += weights[i % PARAMETERS]);
+        let factor = Factor::of(&all, T::ZERO)?;
+        Some(T::of(2.0) * (0..self.count).map(|i| (factor.rows[i][i] / factor.scale[i]).ln()).sum::<T>())
     }
 
     /// The step to the least sum of squares, damped, and by how much that falls in the linear theory; `None` where nothing is determined.

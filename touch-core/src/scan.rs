@@ -75,7 +75,7 @@ pub(crate) fn places(table: &Table<'_>) -> impl Iterator<Item = (usize, usize)> 
 
 /// Where one contact would explain most of a frame, where there is none yet. Counts the looks.
 pub(crate) fn first<T: Real, const K: usize>(
-    Task { table, frame, errors }: Task<'_, T>,
+    Task { table, frame, errors, .. }: Task<'_, T>,
     work: &mut Working<'_, K>,
 ) -> Candidates<T> {
     let (head, n) = (table.head(), table.electrodes());
@@ -159,7 +159,7 @@ mod tests {
             let errors = Errors::of(&frame, &table);
             let mut work = <Work>::default();
             let mut working = Working { done: &mut work, attend: &mut || () };
-            let [best, ..] = first(Task { table: &table, frame: &frame, errors: &errors }, &mut working);
+            let [best, ..] = first(Task { table: &table, frame: &frame, errors: &errors, unknown: None }, &mut working);
             let scales = row_scales(&frame, 16, table.head().drive_v);
             let all: f32 =
                 (0..256).map(|i| (scales[i / 16] * frame.touch_v(i)).powi(2)).sum::<f32>() / errors.variance_v2;

@@ -24,15 +24,15 @@ const SEARCHING: u8 = 20;
 
 /// What a search needs done next.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Wants<T, const K: usize> {
+pub(crate) enum Wants<T, const K: usize, const D: usize> {
     /// A scene fitted, with a standard deviation of the logarithms of radii, in so many steps at most.
-    Fit(Scene<T, K>, T, u8),
+    Fit(Scene<T, K, D>, T, u8),
     /// The places for a first contact in [`Search::starts`].
     First,
     /// The places for one more beside a scene, which is looked at with such a standard deviation, there.
-    Beside(Scene<T, K>, T),
+    Beside(Scene<T, K, D>, T),
     /// Nothing: this was found.
-    Nothing(Option<Fit<T, K>>),
+    Nothing(Option<Fit<T, K, D>>),
 }
 
 /// What a search waits for.
@@ -69,17 +69,17 @@ enum Way {
 
 /// A search, of which one piece after the other is done.
 #[derive(Clone, Debug)]
-pub(crate) struct Search<T, const K: usize> {
+pub(crate) struct Search<T, const K: usize, const D: usize> {
     awaits: Awaits,
     from: Way,
     /// What one more contact is looked for beside.
-    at: Fit<T, K>,
+    at: Fit<T, K, D>,
     /// Best explanation by what was made from here on.
-    best: Option<Fit<T, K>>,
+    best: Option<Fit<T, K, D>>,
     /// The best before that: by what was followed, or of all.
-    kept: Option<Fit<T, K>>,
+    kept: Option<Fit<T, K, D>>,
     /// Best of some that are tried.
-    tried: Option<Fit<T, K>>,
+    tried: Option<Fit<T, K, D>>,
     /// Where contacts may be.
     pub starts: Candidates<T>,
     /// Whether one more is looked for beside a whole explanation, with any radii.
@@ -92,7 +92,7 @@ pub(crate) struct Search<T, const K: usize> {
     anew: u8,
 }
 
-impl<T: Real, const K: usize> Search<T, K> {
+impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     /// None under way.
     pub const NONE: Self = Self {
         awaits: Awaits::First,
@@ -110,7 +110,12 @@ impl<T: Real, const K: usize> Search<T, K> {
     };
 
     /// Looks for what explains a frame best, from what was followed, and from nothing; where one contact would explain most of it alone may be known.
-    pub fn begin(&mut self, followed: Option<Fit<T, K>>, alone: Option<Candidates<T>>, readings: T) -> Wants<T, K> {
+    pub fn begin(
+        &mut self,
+        followed: Option<Fit<T, K, D>>,
+        alone: Option<Candidates<T>>,
+        readings: T,
+    ) -> Wants<T, K, D> {
         (self.best, self.kept, self.tried) = (None, None, None);
         self.from = Way::Followed;
         match (followed, alone) {
@@ -125,13 +130,13 @@ impl<T: Real, const K: usize> Search<T, K> {
     }
 
     /// The best so far, where a search is to end early.
-    pub fn best_so_far(&self) -> Option<Fit<T, K>> {
+    pub fn best_so_far(&self) -> Option<Fit<T, K, D>> {
         let at = Some(self.at).filter(|at| at.scene.count > 0);
         better(self.kept, self.best).or(self.tried).or(at)
     }
 
     /// Takes the fit that it waited for.
-    pub fn fitted(&mut self, found: Option<Fit<T, K>>, readings: T) -> Wants<T, K> {
+    pub fn fitted(&mut self, found: Option<Fit<T, K, D>>, readings: T) -> Wants<T, K, D> {
         match self.awaits {
             Awaits::Grown => {
                 self.best = better(self.best, found);
@@ -170,7 +175,7 @@ impl<T: Real, const K: usize> Search<T, K> {
     }
 
     /// Takes the places that it waited for.
-    pub fn placed(&mut self, readings: T) -> Wants<T, K> {
+    pub fn placed(&mut self, readings: T) -> Wants<T, K, D> {
         let gain = self.starts[0].gain;
         match self.awaits {
             Awaits::More if gain <= T::of(PAID * PARAMETER_PRICE) => {
@@ -197,24 +202,24 @@ impl<T: Real, const K: usize> Search<T, K> {
         }
     }
 
-    fn begin_from_nothing(&mut self) -> Wants<T, K> {
+    fn begin_from_nothing(&mut self) -> Wants<T, K, D> {
         (self.from, self.awaits) = (Way::Nothing, Awaits::First);
         Wants::First
     }
 
     /// Looks for the likeliest number of contacts from some that are found on, one more at a time.
-    fn grow(&mut self, from: Fit<T, K>) -> Wants<T, K> {
+    fn grow(&mut self, from: Fit<T, K, D>) -> Wants<T, K, D> {
         self.best = None;
         self.grow_on(from)
     }
 
-    fn grow_on(&mut self, at: Fit<T, K>) -> Wants<T, K> {
+    fn grow_on(&mut self, at: Fit<T, K, D>) -> Wants<T, K, D> {
         (self.at, self.awaits) = (at, Awaits::Grown);
         Wants::Fit(at.scene, T::of(ANY_RADIUS), SEARCHING)
     }
 
     /// No more contacts are worth their price.
-    fn grown(&mut self, readings: T) -> Wants<T, K> {
+    fn grown(&mut self, readings: T) -> Wants<T, K, D> {
         match self.from {
             Way::Followed => {
                 // What there was more than is no place to go on from.
@@ -233,13 +238,13 @@ impl<T: Real, const K: usize> Search<T, K> {
     }
 
     /// Tries one more contact at the places where it gains more than this.
-    fn start_above(&mut self, least_gain: T, completes: bool) -> Wants<T, K> {
+    fn start_above(&mut self, least_gain: T, completes: bool) -> Wants<T, K, D> {
         self.starts.iter_mut().filter(|start| start.gain <= least_gain).for_each(|start| start.gain = T::ZERO);
         (self.completes, self.tried) = (completes, None);
         self.start(0)
     }
 
-    fn start(&mut self, number: usize) -> Wants<T, K> {
+    fn start(&mut self, number: usize) -> Wants<T, K, D> {
         const { assert!(CANDIDATES <= u8::MAX as usize) };
         self.awaits = Awaits::Start(number as u8);
         let others = if self.completes { self.best.unwrap_or(Fit::NONE) } else { self.at };
@@ -252,14 +257,14 @@ impl<T: Real, const K: usize> Search<T, K> {
     }
 
     /// One more contact was found, or none.
-    fn added(&mut self, found: Option<Fit<T, K>>, readings: T) -> Wants<T, K> {
+    fn added(&mut self, found: Option<Fit<T, K, D>>, readings: T) -> Wants<T, K, D> {
         if !self.completes {
             return match found {
                 Some(more) => self.grow_on(more),
                 None => self.grown(readings),
             };
         }
-        let is_better = |new: &Fit<T, K>| self.best.is_none_or(|best| score(new) < score(&best));
+        let is_better = |new: &Fit<T, K, D>| self.best.is_none_or(|best| score(new) < score(&best));
         match found.filter(is_better) {
             Some(new) => {
                 self.best = Some(new);
@@ -270,7 +275,7 @@ impl<T: Real, const K: usize> Search<T, K> {
     }
 
     /// Leaves out the contacts that the readings do not speak for.
-    fn prune(&mut self, readings: T) -> Wants<T, K> {
+    fn prune(&mut self, readings: T) -> Wants<T, K, D> {
         match self.best {
             None if self.from == Way::Rest => self.exchanged(readings),
             None => self.nothing_found(),
@@ -284,13 +289,13 @@ impl<T: Real, const K: usize> Search<T, K> {
         }
     }
 
-    fn nothing_found(&mut self) -> Wants<T, K> {
+    fn nothing_found(&mut self) -> Wants<T, K, D> {
         self.more = false;
         Wants::Nothing(None)
     }
 
     /// Looks for one more contact beside an explanation, as long as that would explain much of what they leave; notes whether another one would.
-    fn complete(&mut self, readings: T) -> Wants<T, K> {
+    fn complete(&mut self, readings: T) -> Wants<T, K, D> {
         match self.best {
             Some(best) if !best.is_alone => {
                 self.awaits = Awaits::Another;
@@ -303,7 +308,7 @@ impl<T: Real, const K: usize> Search<T, K> {
         }
     }
 
-    fn completed(&mut self, readings: T) -> Wants<T, K> {
+    fn completed(&mut self, readings: T) -> Wants<T, K, D> {
         if self.from == Way::Rest {
             return self.exchanged(readings);
         }
@@ -314,7 +319,7 @@ impl<T: Real, const K: usize> Search<T, K> {
 
     /// Looks for one contact of an explanation that leaves too much anew beside the others: one that went astray early is held there by those that came after it.
     /// As often as there are contacts at most; and where there are more than can be told, it is not for the search that they leave too much.
-    fn exchange(&mut self, readings: T) -> Wants<T, K> {
+    fn exchange(&mut self, readings: T) -> Wants<T, K, D> {
         let Some(kept) = self.kept else { return self.nothing_found() };
         let count = kept.scene.count;
         if usize::from(self.anew) >= count || !self.is_to_be_mended(&kept, readings) {
@@ -326,9 +331,9 @@ impl<T: Real, const K: usize> Search<T, K> {
         Wants::Fit(kept.scene.without(contact), T::of(USUAL_RADIUS), SEARCHING)
     }
 
-    fn exchanged(&mut self, readings: T) -> Wants<T, K> {
+    fn exchanged(&mut self, readings: T) -> Wants<T, K, D> {
         let is_better =
-            |new: &Fit<T, K>| self.kept.is_none_or(|kept| score(new) < score(&kept) - T::of(PARAMETER_PRICE));
+            |new: &Fit<T, K, D>| self.kept.is_none_or(|kept| score(new) < score(&kept) - T::of(PARAMETER_PRICE));
         match self.best.filter(is_better) {
             Some(new) => self.kept = Some(new),
             None => (self.contact, self.more) = (self.contact + 1, self.more_before),
@@ -336,14 +341,14 @@ impl<T: Real, const K: usize> Search<T, K> {
         self.exchange(readings)
     }
 
-    fn is_to_be_mended(&self, fit: &Fit<T, K>, readings: T) -> bool {
+    fn is_to_be_mended(&self, fit: &Fit<T, K, D>, readings: T) -> bool {
         let is_beyond = self.more && fit.scene.count == K;
         !is_beyond && (self.more || is_misfit(fit, readings))
     }
 
     /// Leaves out each contact after this one, if there is one, that the others may do as well without, once they are fitted anew: a second one that was found while
     /// the first was too small. Then the explanation is the one with fewer that is better, if one is, and is looked through again.
-    fn leave_out_after(&mut self, contact: Option<u8>) -> Wants<T, K> {
+    fn leave_out_after(&mut self, contact: Option<u8>) -> Wants<T, K, D> {
         let Some(kept) = self.kept else { return self.nothing_found() };
         if contact.is_none() {
             self.tried = None;
@@ -364,7 +369,7 @@ impl<T: Real, const K: usize> Search<T, K> {
     }
 }
 
-pub(crate) fn freedom<T: Real, const K: usize>(fit: &Fit<T, K>) -> T {
+pub(crate) fn freedom<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> T {
     T::of(PAID) * T::of(fit.scene.count as u32)
 }
 
@@ -374,16 +379,19 @@ pub(crate) fn limit<T: Real>(freedom: T) -> T {
     freedom + T::of(MISFIT_DEVIATIONS) * (T::of(2.0) * freedom).sqrt()
 }
 
-pub(crate) fn is_misfit<T: Real, const K: usize>(fit: &Fit<T, K>, readings: T) -> bool {
+pub(crate) fn is_misfit<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>, readings: T) -> bool {
     fit.cost > limit(readings - freedom(fit))
 }
 
-/// The sum of squares with the price of contacts: of two explanations the lower one is believed.
-fn score<T: Real, const K: usize>(fit: &Fit<T, K>) -> T {
-    fit.objective + T::of(PARAMETER_PRICE * PAID) * T::of(fit.scene.count as u32)
+/// What is left of the evidence: of two explanations the lower one is believed.
+fn score<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> T {
+    -fit.evidence
 }
 
-fn better<T: Real, const K: usize>(a: Option<Fit<T, K>>, b: Option<Fit<T, K>>) -> Option<Fit<T, K>> {
+fn better<T: Real, const K: usize, const D: usize>(
+    a: Option<Fit<T, K, D>>,
+    b: Option<Fit<T, K, D>>,
+) -> Option<Fit<T, K, D>> {
     match (a, b) {
         (Some(a), Some(b)) => Some(if score(&b) < score(&a) { b } else { a }),
         (a, b) => a.or(b),
@@ -391,7 +399,7 @@ fn better<T: Real, const K: usize>(a: Option<Fit<T, K>>, b: Option<Fit<T, K>>) -
 }
 
 /// The contact that the readings speak least for, if that is less than its price.
-pub(crate) fn weakest<T: Real, const K: usize>(fit: &Fit<T, K>) -> Option<usize> {
+pub(crate) fn weakest<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> Option<usize> {
     let all = &fit.information;
     let least = (0..fit.scene.count).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
     (all[least] < T::of(PAID * PARAMETER_PRICE)).then_some(least)

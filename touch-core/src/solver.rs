@@ -8,14 +8,17 @@
 
 use crate::answer::{Answer, Contact, Flags};
 use crate::beside::beside;
+use crate::births::Births;
 use crate::circuit::Circuit;
-use crate::fit::{Fit, Fitting, LN_RADII, LN_SQUARES, Scene, Went, Work, Working};
+use crate::fit::{Bench, Fit, Fitting, LN_RADII, LN_SQUARES, Scene, Went, Work, Working};
 use crate::frame::{Errors, Frame, FrameError, Says};
+use crate::held::Room;
 use crate::normal::ANY_RADIUS;
 use crate::real::Real;
-use crate::scan::{first, no_candidates};
+use crate::scan::{Candidates, first, no_candidates};
 use crate::search::{FIRST_GAIN, Search, Wants, freedom, is_misfit, limit, weakest};
 use crate::table::Table;
+use crate::unknown::{Detector, Layout, Unknown};
 use crate::vector::{Matrix, PARAMETERS};
 
 /// Most contacts that a board looks for.
@@ -41,12 +44,20 @@ pub(crate) struct Task<'a, T> {
     pub table: &'a Table<'a>,
     pub frame: &'a Frame<'a, T>,
     pub errors: &'a Errors<T>,
+    /// What is not known of the detector; none is as its table says.
+    pub unknown: Option<&'a Unknown<'a>>,
 }
 
 impl<T: Real> Task<'_, T> {
     pub fn readings(&self) -> T {
         T::of(self.errors.count as u32)
     }
+}
+
+/// What a piece of work needs besides.
+struct Means<'a, 'm, T> {
+    room: Option<&'a mut Room<'m, T>>,
+    attend: &'a mut dyn FnMut(),
 }
 
 /// What is being made of a frame.
@@ -78,16 +89,16 @@ enum Piece {
 
 /// Finds contacts in frames, one after the other: those of one table.
 #[derive(Clone, Debug)]
-pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS> {
+pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS, const D: usize = 0> {
     circuit: Circuit<T, K>,
-    fitting: Fitting<T, K>,
-    search: Search<T, K>,
+    fitting: Fitting<T, K, D>,
+    search: Search<T, K, D>,
     stage: Stage,
     piece: Piece,
     /// Work on this frame so far; pieces of a search.
     work: Work<K>,
     pieces: u32,
-    scene: Scene<T, K>,
+    scene: Scene<T, K, D>,
     ids: [u32; K],
     /// Numbers begin at 1.
     next_id: u32,
@@ -101,7 +112,7 @@ pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS> {
     is_patient: bool,
 }
 
-impl<T: Real, const K: usize> Default for Solver<T, K> {
+impl<T: Real, const K: usize, const D: usize> Default for Solver<T, K, D> {
     fn default() -> Self {
         Self::blank(false)
     }
@@ -114,7 +125,7 @@ impl Solver {
     }
 }
 
-impl<T: Real, const K: usize> Solver<T, K> {
+impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     /// Pieces of work that a search takes at most; one that is not done by then ends with the best that it has, and [misfit](Flags::MISFIT) is raised. They grow with
     /// the contacts that are tried one after the other, and with those of each try: about as the square of their most.
     ///
@@ -185,14 +196,53 @@ impl<T: Real, const K: usize> Solver<T, K> {
         pieces: u32,
         attend: &mut dyn FnMut(),
     ) -> Result<Option<Answer<T, K>>, FrameError> {
+        self.work_on(table, frame, None, pieces, &mut Means { room: None, attend })
+    }
+
+    /// The contacts of a frame of a detector that is not known exactly. The room is to be the same for all frames; `D` directions count at most.
+    ///
+    /// # Errors
+    /// [`FrameError`] if it cannot be a frame of the table's detector.
+    ///
+    /// # Panics
+    /// If there is less [room](Room::numbers) than it takes.
+    pub fn solve_unknown(
+        &mut self,
+        table: &Table<'_>,
+        unknown: &Unknown<'_>,
+        room: &mut Room<'_, T>,
+        frame: &Frame<'_, T>,
+    ) -> Result<Answer<T, K>, FrameError> {
+        self.stage = Stage::Idle;
+        loop {
+            let means = &mut Means { room: Some(&mut *room), attend: &mut || {} };
+            if let Some(answer) = self.work_on(table, frame, Some(unknown), u32::MAX, means)? {
+                return Ok(answer);
+            }
+        }
+    }
+
+    fn work_on(
+        &mut self,
+        table: &Table<'_>,
+        frame: &Frame<'_, T>,
+        unknown: Option<&Unknown<'_>>,
+        pieces: u32,
+        means: &mut Means<'_, '_, T>,
+    ) -> Result<Option<Answer<T, K>>, FrameError> {
         frame.check(table)?;
         let (frame, left_out) = frame.without_broken(table);
-        let task = Task { table, frame: &frame, errors: &Errors::of(&frame, table) };
+        let mut errors = Errors::of(&frame, table);
+        if unknown.is_some() {
+            // Pads are among what is not known.
+            errors.pads.fill(T::ZERO);
+        }
+        let task = Task { table, frame: &frame, errors: &errors, unknown };
         if self.stage == Stage::Idle {
             (self.stage, self.work) = (Stage::Followed, Work::NONE);
             self.fit(self.scene, T::of(ANY_RADIUS), FOLLOWING);
         }
-        let answer = (0..pieces).find_map(|_| self.go_on(task, attend));
+        let answer = (0..pieces).find_map(|_| self.go_on(task, means));
         Ok(answer.map(|mut answer| {
             answer.left_out = left_out;
             answer.flags.raise(Flags::FAULT, left_out != 0);
@@ -201,20 +251,21 @@ impl<T: Real, const K: usize> Solver<T, K> {
     }
 
     /// Does a piece of work.
-    fn go_on(&mut self, task: Task<'_, T>, attend: &mut dyn FnMut()) -> Option<Answer<T, K>> {
+    fn go_on(&mut self, task: Task<'_, T>, means: &mut Means<'_, '_, T>) -> Option<Answer<T, K>> {
         let readings = task.readings();
-        let mut work = Working { done: &mut self.work, attend };
+        let mut work = Working { done: &mut self.work, attend: &mut *means.attend };
+        let mut bench = Bench { circuit: &mut self.circuit, room: means.room.as_deref_mut() };
         let wants = match self.piece {
-            Piece::Fit => match self.fitting.go_on(task, &mut self.circuit, &mut work) {
+            Piece::Fit => match self.fitting.go_on(task, &mut bench, &mut work) {
                 Went::On => None,
                 Went::ToEnd(found) if self.stage == Stage::Searched => Some(self.search.fitted(found, readings)),
-                Went::ToEnd(found) => return self.fitted(found, task, attend),
+                Went::ToEnd(found) => return self.fitted(found, task, means),
             },
             Piece::First => {
                 self.search.starts = first(task, &mut work);
                 Some(self.search.placed(readings))
             }
-            Piece::Others => match self.fitting.go_on(task, &mut self.circuit, &mut work) {
+            Piece::Others => match self.fitting.go_on(task, &mut bench, &mut work) {
                 Went::ToEnd(Some(_)) => {
                     self.piece = Piece::Beside(0);
                     None
@@ -223,8 +274,13 @@ impl<T: Real, const K: usize> Solver<T, K> {
                 _ => Some(self.search.placed(readings)),
             },
             Piece::Beside(from) => {
-                let (normal, starts) = (&self.fitting.normal, &mut self.search.starts);
-                match beside(task, &self.circuit, normal, from.into(), starts, &mut work) {
+                let (fitting, starts) = (&self.fitting, &mut self.search.starts);
+                if let (Some(unknown), Some(room)) = (task.unknown, &mut bench.room) {
+                    births(task, unknown, bench.circuit, room, fitting, starts, &mut work);
+                    let wants = self.search.placed(readings);
+                    return self.count_piece(task).or_else(|| self.prepare(wants, task));
+                }
+                match beside(task, bench.circuit, &fitting.normal, from.into(), starts, &mut work) {
                     Some(next) => {
                         self.piece = Piece::Beside(next as u16);
                         None
@@ -233,17 +289,23 @@ impl<T: Real, const K: usize> Solver<T, K> {
                 }
             }
         };
-        if self.stage == Stage::Searched {
-            self.pieces += 1;
-            if self.pieces >= Self::MOST_PIECES {
-                return self.found(self.search.best_so_far(), task);
-            }
+        if let Some(answer) = self.count_piece(task) {
+            return Some(answer);
         }
         wants.and_then(|wants| self.prepare(wants, task))
     }
 
+    /// Counts a piece of a search, and ends one that takes too many.
+    fn count_piece(&mut self, task: Task<'_, T>) -> Option<Answer<T, K>> {
+        if self.stage != Stage::Searched {
+            return None;
+        }
+        self.pieces += 1;
+        if self.pieces < Self::MOST_PIECES { None } else { self.found(self.search.best_so_far(), task) }
+    }
+
     /// Prepares what a search wants done.
-    fn prepare(&mut self, wants: Wants<T, K>, task: Task<'_, T>) -> Option<Answer<T, K>> {
+    fn prepare(&mut self, wants: Wants<T, K, D>, task: Task<'_, T>) -> Option<Answer<T, K>> {
         match wants {
             Wants::Fit(scene, radius_deviation, steps) => self.fit(scene, radius_deviation, steps),
             Wants::First => self.piece = Piece::First,
@@ -256,7 +318,7 @@ impl<T: Real, const K: usize> Solver<T, K> {
         None
     }
 
-    fn fit(&mut self, scene: Scene<T, K>, radius_deviation: T, steps: u8) {
+    fn fit(&mut self, scene: Scene<T, K, D>, radius_deviation: T, steps: u8) {
         self.fitting.begin(scene, radius_deviation, steps);
         self.piece = Piece::Fit;
     }
@@ -264,16 +326,16 @@ impl<T: Real, const K: usize> Solver<T, K> {
     /// Takes a fit that is none of a search.
     fn fitted(
         &mut self,
-        found: Option<Fit<T, K>>,
+        found: Option<Fit<T, K, D>>,
         task: Task<'_, T>,
-        attend: &mut dyn FnMut(),
+        means: &mut Means<'_, '_, T>,
     ) -> Option<Answer<T, K>> {
         match (self.stage, found.and_then(|fit| Some((fit, weakest(&fit)?)))) {
             (Stage::Followed, Some((fit, gone))) => {
                 self.fit(fit.scene.without(gone), T::of(ANY_RADIUS), LEAVING_OUT);
                 None
             }
-            (Stage::Followed, None) => self.followed(found, task, attend),
+            (Stage::Followed, None) => self.followed(found, task, means),
             (stage, _) => Some(self.end(found, stage == Stage::Kept, task)),
         }
     }
@@ -281,9 +343,9 @@ impl<T: Real, const K: usize> Solver<T, K> {
     /// Decides what becomes of a frame by what was followed in it.
     fn followed(
         &mut self,
-        found: Option<Fit<T, K>>,
+        found: Option<Fit<T, K, D>>,
         task: Task<'_, T>,
-        attend: &mut dyn FnMut(),
+        means: &mut Means<'_, '_, T>,
     ) -> Option<Answer<T, K>> {
         let readings = task.readings();
         // Nothing is left, or far less unexplained: what did not fit is gone.
@@ -291,8 +353,9 @@ impl<T: Real, const K: usize> Solver<T, K> {
         if has_changed {
             self.wait = 0;
         }
-        let most = |fit: &Fit<T, K>| (T::of(WORSE) * self.searched).max(limit(readings - freedom(fit)));
-        let alone = found.is_none().then(|| first(task, &mut Working { done: &mut self.work, attend }));
+        let most = |fit: &Fit<T, K, D>| (T::of(WORSE) * self.searched).max(limit(readings - freedom(fit)));
+        let alone =
+            found.is_none().then(|| first(task, &mut Working { done: &mut self.work, attend: &mut *means.attend }));
         let is_lost = match (&found, &alone) {
             (Some(fit), _) => has_changed || fit.cost > most(fit),
             (None, alone) => alone.is_some_and(|alone| alone[0].gain >= T::of(FIRST_GAIN)),
@@ -320,7 +383,7 @@ impl<T: Real, const K: usize> Solver<T, K> {
     }
 
     /// Takes what a search has found; notes how well it explains the frame. One that was not ended did not end well.
-    fn found(&mut self, found: Option<Fit<T, K>>, task: Task<'_, T>) -> Option<Answer<T, K>> {
+    fn found(&mut self, found: Option<Fit<T, K, D>>, task: Task<'_, T>) -> Option<Answer<T, K>> {
         self.search.more &= found.is_some();
         self.searched = found.map_or(T::ZERO, |fit| fit.cost);
         let fits = self.pieces < Self::MOST_PIECES && found.is_none_or(|fit| !is_misfit(&fit, task.readings()));
@@ -337,7 +400,7 @@ impl<T: Real, const K: usize> Solver<T, K> {
     }
 
     /// The answer, with what is the last fit if there is one.
-    fn end(&mut self, found: Option<Fit<T, K>>, is_lost: bool, task: Task<'_, T>) -> Answer<T, K> {
+    fn end(&mut self, found: Option<Fit<T, K, D>>, is_lost: bool, task: Task<'_, T>) -> Answer<T, K> {
         let is_searched = self.stage == Stage::Found;
         // A search that ends well has nothing to wait for.
         self.was_lost = if is_searched { self.wait > 0 } else { is_lost };
@@ -351,7 +414,7 @@ impl<T: Real, const K: usize> Solver<T, K> {
     }
 
     /// Gives contacts the numbers of the nearest ones before.
-    fn number(&mut self, before: &Scene<T, K>) {
+    fn number(&mut self, before: &Scene<T, K, D>) {
         let old = self.ids;
         let (mut given, mut taken) = ([false; K], [false; K]);
         let count = self.scene.count;
@@ -375,13 +438,15 @@ impl<T: Real, const K: usize> Solver<T, K> {
         }
     }
 
-    fn answer(&mut self, found: Option<Fit<T, K>>, task: Task<'_, T>) -> Answer<T, K> {
+    fn answer(&mut self, found: Option<Fit<T, K, D>>, task: Task<'_, T>) -> Answer<T, K> {
         let mut answer = Answer::of(self.work);
         answer.flags.raise(Flags::SATURATED, task.errors.is_full);
         answer.flags.raise(Flags::MORE, self.search.more);
-        let Task { table, frame, errors } = task;
+        let Task { table, frame, errors, unknown } = task;
         let readings = task.readings();
-        let Some(fit) = found.filter(|fit| self.circuit.solve(task.table, fit.scene.spots())) else {
+        let Some(fit) =
+            found.filter(|fit| unknown.is_some() || self.circuit.solve(&Detector::described(table), fit.scene.spots()))
+        else {
             let voltages = (0..frame.volts.len()).filter(|i| frame.says_at(*i) == Says::Voltage);
             let squares: T = voltages.map(|i| frame.volts[i] * frame.volts[i]).sum();
             answer.residual = (squares / errors.variance_v2 / readings.max(T::ONE)).sqrt().min(T::max_value());
@@ -437,8 +502,27 @@ impl<T: Real, const K: usize> Solver<T, K> {
     }
 }
 
+/// Takes the places where one more contact would explain most of what those of a fit leave, on a detector that is not known.
+fn births<T: Real, const K: usize, const D: usize>(
+    task: Task<'_, T>,
+    unknown: &Unknown<'_>,
+    circuit: &Circuit<T, K>,
+    room: &mut Room<'_, T>,
+    fitting: &Fitting<T, K, D>,
+    starts: &mut Candidates<T>,
+    work: &mut Working<'_, K>,
+) {
+    let mut parts = room.parts(task.table, unknown, K);
+    let layout = Layout::of(task.table, unknown);
+    let moved = layout.moved(task.table, unknown, &fitting.scene.steps, parts.moved, parts.shares);
+    let detector = &Detector { table: task.table, moved: Some((unknown, moved)) };
+    let noise_v = fitting.on.tau * task.errors.variance_v2.sqrt();
+    let (normal, kept, held) = (&fitting.normal, &fitting.on.kept, &mut parts.held);
+    Births { task, detector, circuit, normal, held, kept, noise_v }.look(starts, work);
+}
+
 /// Whether a fit leaves more than noise does, and the table takes that for an error of the detector.
-fn is_to_be_calibrated<T: Real, const K: usize>(fit: &Fit<T, K>, task: Task<'_, T>) -> bool {
+fn is_to_be_calibrated<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>, task: Task<'_, T>) -> bool {
     let Task { table, errors, .. } = task;
     let noise_v = T::of(table.head().noise_v);
     let of_noise = errors.variance_v2 / (noise_v * noise_v);

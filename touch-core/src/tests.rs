@@ -8,6 +8,7 @@ use crate::frame::Errors;
 use crate::normal::ANY_RADIUS;
 use crate::samples::{seal, table};
 use crate::table::MAX_ELECTRODES;
+use crate::unknown::Detector;
 use crate::vector::PARAMETERS;
 use crate::{BOARD_CONTACTS, Flags, Frame, FrameError, Says, Solver, Table, TableError};
 
@@ -15,8 +16,8 @@ use crate::{BOARD_CONTACTS, Flags, Frame, FrameError, Says, Solver, Table, Table
 pub(crate) type Spot = crate::circuit::Spot<f32>;
 pub(crate) type Circuit = crate::circuit::Circuit<f32, BOARD_CONTACTS>;
 pub(crate) type Normal = crate::normal::Normal<f32, BOARD_CONTACTS>;
-pub(crate) type Scene = crate::fit::Scene<f32, BOARD_CONTACTS>;
-pub(crate) type Fit = crate::fit::Fit<f32, BOARD_CONTACTS>;
+pub(crate) type Scene = crate::fit::Scene<f32, BOARD_CONTACTS, 0>;
+pub(crate) type Fit = crate::fit::Fit<f32, BOARD_CONTACTS, 0>;
 
 pub(crate) fn spot(x_m: f32, y_m: f32, sheets: f32) -> Spot {
     Spot { at_m: [x_m, y_m], ln_ohm: (1.0 / (sheets * 1.1e-3) + 600.0).ln(), ln_radius: 0.0 }
@@ -25,10 +26,10 @@ pub(crate) fn spot(x_m: f32, y_m: f32, sheets: f32) -> Spot {
 /// Readings of contacts (V).
 pub(crate) fn volts(table: &Table<'_>, spots: &[Spot]) -> Vec<f32> {
     let (n, mut circuit) = (table.electrodes(), Circuit::EMPTY);
-    assert!(circuit.solve(table, spots));
+    assert!(circuit.solve(&Detector::described(table), spots));
     let mut row = [0.0; MAX_ELECTRODES];
     let of_row = |g: usize| {
-        circuit.row_v(table, g, &mut row);
+        circuit.row_v(&Detector::described(table), g, &mut row);
         row[..n].to_vec()
     };
     (0..n).flat_map(of_row).collect()
@@ -70,8 +71,8 @@ fn slopes_are_the_differences_of_the_sum_of_squares() {
     let errors = Errors::of(&frame, &table);
     let summed = |spots: &[Spot]| {
         let (mut circuit, mut normal) = (Circuit::EMPTY, Normal::EMPTY);
-        assert!(circuit.solve(&table, spots));
-        normal.sum_up(&table, &circuit, &frame, &errors, ANY_RADIUS);
+        assert!(circuit.solve(&Detector::described(&table), spots));
+        normal.sum_up(&Detector::described(&table), &circuit, &frame, &errors, ANY_RADIUS, None);
         normal
     };
     let mut begun = truth;

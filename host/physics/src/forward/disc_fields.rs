@@ -28,7 +28,11 @@ impl DiscFields {
 
     /// From the impedances that a light disc gives, on any model. With one contact, `Z[e][g] = E[e][g] + A - u_e - u_g` (fields `E` between the electrodes, `u`
     /// at the contact, `A` its resistance with its own field), so that `u` and `A` follow from `Z` in the gauge in which `u` has no mean.
-    pub(super) fn of_light(model: &(impl ForwardModel + ?Sized), [x_m, y_m]: Point, radius_m: f64) -> Result<Self, ForwardError> {
+    pub(super) fn of_light(
+        model: &(impl ForwardModel + ?Sized),
+        [x_m, y_m]: Point,
+        radius_m: f64,
+    ) -> Result<Self, ForwardError> {
         let pads_ohm = model.electrode_fields_ohm();
         let conductances_s = LIGHT_SHEETS.map(|sheets| sheets * model.detector().sheet_conductance_s());
         let by_contact = |conductance_s: f64| {

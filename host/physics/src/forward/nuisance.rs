@@ -354,7 +354,10 @@ impl Changed {
 
 /// Contact resistance of the pads (ohm), with what the crowding of the current on them makes of it: a change of all contact impedances by
 /// a share of one changes `Z[g][g]` by so much.
-fn pads_ohm(model: &dyn ForwardModel) -> Result<Vec<f64>, ForwardError> {
+///
+/// # Errors
+/// [`ForwardError::Detector`] if the detector with other pads cannot be modelled.
+pub fn pads_ohm(model: &dyn ForwardModel) -> Result<Vec<f64>, ForwardError> {
     const STEP: f64 = 0.1;
     let more = model.of_similar(&model.detector().stepped(&[(Parameter::Pads, STEP)]))?;
     let [before, after] = [model.electrode_fields_ohm(), more.electrode_fields_ohm()];

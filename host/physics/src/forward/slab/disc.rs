@@ -233,7 +233,8 @@ impl DiscSelf {
 
 /// Impedance of an even current over a disc to itself (ohm): what [`DiscSelf`] has between its first densities.
 pub(super) fn even_ohm(a_m: f64, sigma: f64, excess: impl Fn(f64) -> f64) -> f64 {
-    let layers = |point: &HankelPoint| point.weight * excess(point.ln_at - a_m.ln()) * (point.bessel[0] / point.at).powi(2);
+    let layers =
+        |point: &HankelPoint| point.weight * excess(point.ln_at - a_m.ln()) * (point.bessel[0] / point.at).powi(2);
     2.0 / (PI * sigma * a_m) * (HALF_SPACE[0] + HANKEL.iter().map(layers).sum::<f64>())
 }
 

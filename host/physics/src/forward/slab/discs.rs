@@ -6,10 +6,10 @@ use super::cut::CutDisc;
 use super::disc::DiscBasis;
 use super::pads::between;
 use super::{Slab, from_corner};
-use crate::forward::{DiscFields, ForwardError};
-use crate::geometry::Point;
 use crate::forward::contact::{ContactSystem, Contacted};
 use crate::forward::uneven_place::UnevenPlace;
+use crate::forward::{DiscFields, ForwardError};
+use crate::geometry::Point;
 use crate::scene::Contact;
 
 /// Degree of the densities that the kernel's changes are taken for.

@@ -3,7 +3,9 @@
 //! On a computer it works in [`Number`]s, and finds up to [`MOST_CONTACTS`].
 
 mod between;
+mod changes;
 mod file;
+mod splines;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -12,10 +14,12 @@ mod unknown;
 use std::sync::Arc;
 
 use tactomo_touch_core::{
-    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Real, Says as CoreSays, Solver as Core, Table,
+    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Real, Room, Says as CoreSays, Solver as Core, Table,
 };
 
+use self::changes::Changes;
 pub use self::file::{CompiledTable, TableFileError};
+use self::table::compile_apart;
 pub use self::table::{CompileError, compile};
 use crate::solve::answer::{Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
 use crate::solve::fit::policy;
@@ -25,18 +29,25 @@ use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::ForceLaw;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::{Readings, Says};
+use tactomo_physics::threads;
 
 /// What it works in.
-type Number = f32;
+type Number = f64;
 /// Most contacts that it looks for.
 const MOST_CONTACTS: usize = 8;
+/// Most directions in which a detector may differ.
+const MOST_DIRECTIONS: usize = 256;
 
 /// `core`: contacts by the board's own search, by a table.
 pub struct Compiled {
     bytes: Arc<[u8]>,
     electrodes: usize,
     drive_v: f64,
-    core: Core<Number, MOST_CONTACTS>,
+    core: Box<Core<Number, MOST_CONTACTS, MOST_DIRECTIONS>>,
+    changes: Option<Changes>,
+    /// Where the core works on them.
+    numbers: Vec<Number>,
+    shares: Vec<f32>,
 }
 
 impl Compiled {
@@ -47,13 +58,22 @@ impl Compiled {
     pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
         let detector = problem.detector();
         let refused = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
-        let bytes = compile(problem).map_err(|error| match error {
+        let wrong = |error| match error {
             CompileError::Model(error) => error,
             error => refused(with_causes(&error)),
-        })?;
-        Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
+        };
+        let bytes = compile_apart(problem).map_err(wrong)?;
+        let table = Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
         let (electrodes, drive_v) = (detector.electrodes.len(), detector.drive_v);
-        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Core::default() })
+        let changes = Changes::of(problem, threads::cores()).map_err(wrong)?;
+        let changes = changes.filter(|changes| changes.directions() <= MOST_DIRECTIONS);
+        let (mut numbers, mut shares) = (Vec::new(), Vec::new());
+        if let Some(changes) = &changes {
+            let unknown = changes.unknown();
+            numbers = vec![0.0; Room::<Number>::numbers(&table, &unknown, MOST_CONTACTS)];
+            shares = vec![0.0; unknown.tables];
+        }
+        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Box::default(), changes, numbers, shares })
     }
 
     /// A reading as a board can give it (V): none is far beyond its drive.
@@ -75,7 +95,15 @@ impl Solver for Compiled {
         let wrong = SolveError::Electrodes { found: readings.electrodes(), expected: self.electrodes };
         // It was read, and checked, when it was compiled.
         let table = Table::read_again(&self.bytes).map_err(|_| wrong.clone())?;
-        match self.core.solve(&table, &Frame::new(&volts, &says)) {
+        let frame = Frame::new(&volts, &says);
+        let answer = match &self.changes {
+            Some(changes) => {
+                let mut room = Room { numbers: &mut self.numbers, shares: &mut self.shares };
+                self.core.solve_unknown(&table, &changes.unknown(), &mut room, &frame)
+            }
+            None => self.core.solve(&table, &frame),
+        };
+        match answer {
             Ok(answer) => Ok(solution(&answer)),
             Err(FrameError::NotFinite { g, e }) => Err(SolveError::NotFinite { g, e }),
             Err(_) => Err(wrong),

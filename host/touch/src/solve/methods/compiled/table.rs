@@ -1,35 +1,21 @@
 //! The table of a detector for [`tactomo_touch_core`]: contacts without a computer.
 //!
-//! Fields are those of the model that solvers invert: means over discs, from the impedances that a light one gives. With one contact,
-//! `Z[e][g] = E[e][g] + A - u_e - u_g` (fields `E` between the electrodes, `u` at the contact, `A` its resistance with its own field), so that `u` and `A`
-//! follow from `Z` in the gauge in which `u` has no mean. They are found for a small and for a wide disc. Splines are fitted to places all over the detector by least squares.
+//! Fields are those of the model that solvers invert, of an even current over a small and over a wide disc; splines are fitted to places all over the detector.
 
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::DMatrix;
 
-use tactomo_physics::detector::ForceLaw;
-use tactomo_physics::forward::ForwardError;
-use tactomo_physics::scene::Contact;
+use tactomo_physics::detector::{ForceLaw, Parameter};
+use tactomo_physics::forward::{DiscFields, ForwardError};
 use tactomo_touch_core::Contents;
-use tactomo_touch_core::spline::{interval, weights};
-use tactomo_touch_core::table::{EVEN_SPREADING, Head, MAX_ELECTRODES, MAX_SIDE, OTHERS, RADII};
+use tactomo_touch_core::table::{EVEN_SPREADING, Head, MAX_ELECTRODES, RADII};
 
-use super::between::Between;
+use super::between::{Between, Paired};
+use super::splines::{Grid, Splines};
 use super::unknown::{Unknown, tried_m};
 use crate::solve::fit::linear::full_v;
 use crate::solve::fit::target::{PAD_ERROR, model_error};
 use crate::solve::problem::Problem;
 
-/// Cells, about. Of 390 random scenes of one to three discs on `square-60` 27 contacts are invented with 35 cells along a side (106 kB), 35 with 34 (100 kB) and 35
-/// with 33 (95 kB); 66, 73 and 73 are missed.
-const CELLS: usize = 1200;
-/// Fewest cells along a side.
-const LEAST_CELLS: usize = 6;
-/// Places along each side of a cell that splines are fitted to.
-const PLACES: usize = 2;
-/// Weight of the squares of second differences of coefficients, over that of a place: it decides where no place does.
-const SMOOTHNESS: f64 = 1e-6;
-/// Conductances of the light discs (sheet conductances): their current is even.
-const LIGHT_SHEETS: [f64; 2] = [1e-4, 1e-3];
 /// Radii of the small and of the wide disc, in usual ones.
 const DISCS: [f64; RADII] = [0.6, 2.2];
 /// What readings by a table are off from the model's, as a share of the largest: of 150 random scenes of one to three discs on `square-60` as many have the
@@ -75,6 +61,18 @@ pub enum CompileError {
 /// # Errors
 /// [`CompileError`] if it is curved, has too many electrodes or no model.
 pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
+    compile_with(problem, Unknown::of(problem))
+}
+
+/// The table for who knows [what is not known](super::changes::Changes) of the detector apart from it: of its errors it has those only that no readings tell.
+pub(super) fn compile_apart(problem: &Problem) -> Result<Vec<u8>, CompileError> {
+    let directions = problem.detector().unknowns().directions;
+    let conductivity = directions.iter().flatten().filter(|(parameter, _)| *parameter == Parameter::Conductivity);
+    let square: f64 = conductivity.map(|(_, step)| step * step).sum();
+    compile_with(problem, Unknown { ln_conductance: square.sqrt(), ..Unknown::default() })
+}
+
+fn compile_with(problem: &Problem, unknown: Unknown) -> Result<Vec<u8>, CompileError> {
     let detector = problem.detector();
     let n = detector.electrodes.len();
     if n > MAX_ELECTRODES {
@@ -83,120 +81,27 @@ pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
     if detector.surface.is_some() {
         return Err(CompileError::Curved { detector: detector.name.clone() });
     }
-    let grid = Grid::of(problem);
-    let quantities = grid.fitted(problem)?;
-    let between = Between::of(problem, &grid)?;
-    Ok(written(problem, &grid, &quantities, &between))
-}
-
-/// Cells that cover a detector.
-pub(super) struct Grid {
-    low_m: [f64; 2],
-    step_m: [f64; 2],
-    cells: [usize; 2],
-}
-
-impl Grid {
-    fn of(problem: &Problem) -> Self {
-        let [low_m, high_m] = problem.detector().outline.bounds();
-        let size_m = [0, 1].map(|axis| high_m[axis] - low_m[axis]);
-        let step_m = (size_m[0] * size_m[1] / CELLS as f64).sqrt();
-        let cells = size_m.map(|size_m| ((size_m / step_m).round() as usize).clamp(LEAST_CELLS, MAX_SIDE - 3));
-        Self { low_m, step_m: [0, 1].map(|axis| size_m[axis] / cells[axis] as f64), cells }
-    }
-
-    fn sides(&self) -> [usize; 2] {
-        self.cells.map(|cells| cells + 3)
-    }
-
-    /// A place by cells from the lowest corner.
-    fn place_m(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [self.low_m[0] + x * self.step_m[0], self.low_m[1] + y * self.step_m[1]]
-    }
-
-    /// Places on the detector, so many along each side of a cell.
-    pub fn places_m(&self, problem: &Problem, per_cell: usize) -> Vec<[f64; 2]> {
-        let [columns, rows] = self.cells.map(|cells| cells * per_cell);
-        let at = |index: usize| (index as f64 + 0.5) / per_cell as f64;
-        let all = (0..rows).flat_map(|j| (0..columns).map(move |i| [at(i), at(j)]));
-        all.map(|at| self.place_m(at)).filter(|place_m| problem.detector().outline.holds(*place_m)).collect()
-    }
-
-    /// Coefficients with their weights at a place.
-    fn stencil(&self, place_m: [f64; 2]) -> [(usize, f64); 16] {
-        let along = [0, 1].map(|axis| {
-            let position = (place_m[axis] - self.low_m[axis]) / self.step_m[axis];
-            let (cell, t) = interval(position as f32, self.cells[axis]);
-            (cell, weights(t).value.map(f64::from))
-        });
-        let [(i, x), (j, y)] = along;
-        std::array::from_fn(|k| ((j + k / 4) * self.sides()[0] + i + k % 4, x[k % 4] * y[k / 4]))
-    }
-
-    /// Coefficients of all quantities: a column each.
-    fn fitted(&self, problem: &Problem) -> Result<DMatrix<f64>, CompileError> {
-        let places_m = self.places_m(problem, PLACES);
-        let [columns, rows] = self.sides();
-        let count = columns * rows;
-        let quantities = RADII * (problem.detector().electrodes.len() + OTHERS);
-        let mut matrix = DMatrix::zeros(count, count);
-        let mut right = DMatrix::zeros(count, quantities);
-        let values = values(problem, &places_m)?;
-        for (place_m, values) in places_m.iter().zip(&values) {
-            let stencil = self.stencil(*place_m);
-            for (i, weight) in stencil {
-                stencil.iter().for_each(|(j, other)| matrix[(i, *j)] += weight * other);
-                values.iter().enumerate().for_each(|(q, value)| right[(i, q)] += weight * value);
-            }
-        }
-        let mut smooth = |three: [usize; 3]| {
-            for (i, a) in three.into_iter().zip([1.0, -2.0, 1.0]) {
-                three.into_iter().zip([1.0, -2.0, 1.0]).for_each(|(j, b)| matrix[(i, j)] += SMOOTHNESS * a * b);
-            }
-        };
-        for j in 0..rows {
-            (1..columns - 1).for_each(|i| smooth([i - 1, i, i + 1].map(|i| j * columns + i)));
-        }
-        for i in 0..columns {
-            (1..rows - 1).for_each(|j| smooth([j - 1, j, j + 1].map(|j| j * columns + i)));
-        }
-        let factor = Cholesky::new(matrix).ok_or_else(|| failed(problem, "the places do not determine them"))?;
-        factor.solve_mut(&mut right);
-        Ok(right)
-    }
+    let splines = Splines::of(problem)?;
+    let places_m = splines.places_m();
+    let of_place = |place_m: &[f64; 2]| {
+        let [small, wide] = DISCS.map(|radii| of_disc(problem, *place_m, radii * problem.usual_radius_m()));
+        Ok([small?, wide?].concat())
+    };
+    let values = places_m.iter().map(of_place).collect::<Result<Vec<_>, ForwardError>>()?;
+    let quantities = splines.fitted(&values);
+    let (paired, between) = Paired::of(problem)?;
+    Ok(written(problem, &splines.grid, &quantities, (&paired, &between), unknown))
 }
 
 pub(super) fn failed(problem: &Problem, what: &'static str) -> CompileError {
     CompileError::Fit { detector: problem.detector().name.clone(), what }
 }
 
-/// All quantities at some places.
-fn values(problem: &Problem, places_m: &[[f64; 2]]) -> Result<Vec<Vec<f64>>, ForwardError> {
-    let of_place = |place_m: &[f64; 2]| {
-        let [small, wide] = DISCS.map(|radii| of_disc(problem, *place_m, radii * problem.usual_radius_m()));
-        Ok([small?, wide?].concat())
-    };
-    places_m.iter().map(of_place).collect()
-}
-
 /// All quantities of a disc.
-fn of_disc(problem: &Problem, [x_m, y_m]: [f64; 2], radius_m: f64) -> Result<Vec<f64>, ForwardError> {
-    let detector = problem.detector();
-    let pads_ohm = problem.model.electrode_fields_ohm();
-    let conductances_s = LIGHT_SHEETS.map(|sheets| sheets * detector.sheet_conductance_s());
-    let by_contact = |conductance_s: f64| {
-        let contact = Contact::flat(x_m, y_m, radius_m, conductance_s);
-        Ok(problem.model.impedance_ohm(&[contact])? - pads_ohm)
-    };
-    let [lighter, firmer] = [by_contact(conductances_s[0])?, by_contact(conductances_s[1])?];
-    let [lighter_ohm, firmer_ohm] = [lighter.mean(), firmer.mean()];
-    // The resistance of the contact is that of its part on the detector.
-    let whole_ohm = conductances_s[0].recip() - conductances_s[1].recip();
-    let share = whole_ohm / (lighter_ohm - firmer_ohm);
-    let own_ohm = firmer_ohm - 1.0 / (share * conductances_s[1]);
+fn of_disc(problem: &Problem, place_m: [f64; 2], radius_m: f64) -> Result<Vec<f64>, ForwardError> {
+    let DiscFields { electrodes_ohm, own_ohm, share } = problem.model.disc_fields(place_m, radius_m)?;
     let even_ohm = EVEN_SPREADING / (top_s_per_m(problem) * radius_m);
-    let fields = (0..pads_ohm.nrows()).map(|e| firmer_ohm - firmer.row(e).mean());
-    Ok(fields.chain([own_ohm - even_ohm, share.clamp(0.0, 1.0)]).collect())
+    Ok(electrodes_ohm.into_iter().chain([own_ohm - even_ohm, share]).collect())
 }
 
 fn top_s_per_m(problem: &Problem) -> f64 {
@@ -204,7 +109,13 @@ fn top_s_per_m(problem: &Problem) -> f64 {
 }
 
 /// The bytes.
-fn written(problem: &Problem, grid: &Grid, quantities: &DMatrix<f64>, between: &Between) -> Vec<u8> {
+fn written(
+    problem: &Problem,
+    grid: &Grid,
+    quantities: &DMatrix<f64>,
+    (paired, between): (&Paired, &Between),
+    unknown: Unknown,
+) -> Vec<u8> {
     let detector = problem.detector();
     let n = detector.electrodes.len();
     let pads_ohm = problem.model.electrode_fields_ohm();
@@ -214,7 +125,7 @@ fn written(problem: &Problem, grid: &Grid, quantities: &DMatrix<f64>, between: &
         .flat_map(|row| row.iter().zip(&codes).map(|(v, code)| code.of_value(*v)).collect::<Vec<_>>());
     let mut bytes = Vec::new();
     Contents {
-        head: head(problem, grid, between),
+        head: head(problem, grid, paired, unknown),
         places_m: &detector.electrodes.iter().map(|pad| pad.place_m().map(|m| m as f32)).collect::<Vec<_>>(),
         sides: grid.sides(),
         pads_ohm: &floats((0..n).flat_map(|e| (0..=e).map(move |g| pads_ohm[(e, g)]))),
@@ -237,9 +148,8 @@ fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
     values.into_iter().map(|value| value as f32).collect()
 }
 
-fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
+fn head(problem: &Problem, grid: &Grid, paired: &Paired, unknown: Unknown) -> Head {
     let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
-    let unknown = Unknown::of(problem);
     // Without one, or where nothing is left of it, there is no scale for forces.
     let constriction_ohm = constriction_ohm(problem).filter(|ohm| *ohm > 0.0);
     let law = detector.force.as_ref().filter(|_| constriction_ohm.is_some());
@@ -251,8 +161,8 @@ fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
         step_y_m: grid.step_m[1] as f32,
         radius_m: radius_m as f32,
         radii_m: DISCS.map(|radii| (radii * radius_m) as f32),
-        near_m: between.near_m as f32,
-        ln_step: between.ln_step as f32,
+        near_m: paired.near_m as f32,
+        ln_step: paired.ln_step as f32,
         drive_v: detector.drive_v as f32,
         on_resistance_ohm: detector.on_resistance_ohm as f32,
         noise_v: detector.adc.deviation_v() as f32,

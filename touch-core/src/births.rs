@@ -1,0 +1,116 @@
+//! Where one more contact would explain most of what others leave of a frame, on a detector that is not known.
+//!
+//! As [`beside`](crate::beside), with what is not known of the detector in the covariance: the residual is whitened, and freed of what the detector's steps explain; the square
+//! of what a contact at a place would change is less what steps and contacts could do as well. That is worked out for those places only that would explain most without it.
+
+use crate::circuit::{Circuit, Spot};
+use crate::fit::{Working, held_ohm};
+use crate::held::{Held, Kept, dot};
+use crate::normal::{Factor, Normal};
+use crate::real::Real;
+use crate::scan::{APART, Candidate, Candidates, places, take};
+use crate::solver::Task;
+use crate::table::MAX_ELECTRODES;
+use crate::unknown::Detector;
+use crate::vector::Vector;
+
+/// Places that are looked at closely.
+const CLOSELY: usize = 32;
+/// Share of a pattern that is taken for new at least.
+const LEAST_NEW: f32 = 2e-4;
+/// Damping of the normal equations in what contacts that are there could do as well.
+const DAMPING: f32 = 1e-3;
+
+/// Where to look.
+#[derive(Clone, Copy)]
+struct Place<T> {
+    cell: (usize, usize),
+    /// What it would explain if nothing else could.
+    gain: T,
+}
+
+/// What is left by contacts on a detector whose patterns are held.
+pub(crate) struct Births<'a, 'h, T, const K: usize, const D: usize> {
+    pub task: Task<'a, T>,
+    pub detector: &'a Detector<'a, T>,
+    pub circuit: &'a Circuit<T, K>,
+    pub normal: &'a Normal<T, K>,
+    pub held: &'a mut Held<'h, T>,
+    pub kept: &'a Kept<D>,
+    /// What is taken for noise (V).
+    pub noise_v: T,
+}
+
+impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
+    /// Takes the best places; none where the contacts are not determined.
+    pub fn look(&mut self, best: &mut Candidates<T>, work: &mut Working<'_, K>) {
+        let Some(factor) = Factor::of(self.normal, T::of(DAMPING)) else { return };
+        self.held.whiten(self.kept.count);
+        let table = self.task.table;
+        let mut change = [T::ZERO; MAX_ELECTRODES * MAX_ELECTRODES];
+        let change = &mut change[..table.electrodes() * table.electrodes()];
+        let mut list = [Place { cell: (0, 0), gain: T::ZERO }; CLOSELY];
+        for cell in places(table) {
+            if !self.is_free(cell) {
+                continue;
+            }
+            work.looked();
+            self.change(cell, change);
+            let along = dot(change, self.held.left());
+            let gain = along * along / dot(change, change);
+            let last = &mut list[CLOSELY - 1];
+            if along > T::ZERO && gain > last.gain {
+                *last = Place { cell, gain };
+                list.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain));
+            }
+        }
+        for Place { cell: (i, j), .. } in list.into_iter().filter(|place| place.gain > T::ZERO) {
+            let own_ohm = self.change((i, j), change);
+            let along = dot(change, self.held.left());
+            let square = self.new_square(change, &factor);
+            let ln_ohm = held_ohm((square / along).max(own_ohm).ln(), table);
+            let spot = Spot { at_m: table.middle_m(i, j), ln_ohm, ln_radius: T::ZERO };
+            let gain = along * along / square;
+            take(best, Candidate { spot, gain }, T::of(APART) * T::of(table.head().radius_m));
+        }
+    }
+
+    fn is_free(&self, (i, j): (usize, usize)) -> bool {
+        let (table, radius_m) = (self.task.table, T::of(self.task.table.head().radius_m));
+        let at_m: [T; 2] = table.middle_m(i, j);
+        let is_apart = |spot: &Spot<T>| {
+            let [x, y] = [0, 1].map(|d| at_m[d] - spot.at_m[d]);
+            x * x + y * y > radius_m * radius_m
+        };
+        let mut there = self.circuit.loaded.iter().take(self.circuit.count).map(|one| &one.spot);
+        table.holds(at_m[0], at_m[1]) && there.all(is_apart)
+    }
+
+    /// What a siemens at a place changes, in noise; returns the own field of a disc there (ohm).
+    fn change(&self, (i, j): (usize, usize), change: &mut [T]) -> T {
+        let (table, n) = (self.task.table, self.task.table.electrodes());
+        let (mut fields_ohm, mut potentials_ohm) = ([T::ZERO; MAX_ELECTRODES], [T::ZERO; MAX_ELECTRODES]);
+        let own_ohm = table.rough(i, j, &mut fields_ohm);
+        self.circuit.potentials_ohm(self.detector, table.middle_m(i, j), &fields_ohm, &mut potentials_ohm);
+        let drive_v = T::of(table.head().drive_v);
+        let mut volts = [T::ZERO; MAX_ELECTRODES];
+        for (g, row) in change.chunks_exact_mut(n).enumerate() {
+            self.circuit.row_v(self.detector, g, &mut volts);
+            let own = potentials_ohm[g];
+            let per_ohm = drive_v * own / (self.circuit.loads_ohm[g] * self.noise_v);
+            for (e, value) in row.iter_mut().enumerate() {
+                *value = per_ohm * (potentials_ohm[e] - (T::ONE - volts[e] / drive_v) * own);
+            }
+        }
+        own_ohm
+    }
+
+    /// Its square, but for what steps of the detector and contacts could do as well.
+    fn new_square(&mut self, change: &[T], factor: &Factor<T, K>) -> T {
+        let all = dot(change, change);
+        let mut shared = Vector::<T, K>::ZERO;
+        let by_detector =
+            self.held.shared(change, self.kept.count, T::ONE / self.noise_v, &mut shared[..self.normal.count]);
+        (all - by_detector - factor.square(shared)).max(T::of(LEAST_NEW) * all)
+    }
+}

@@ -1,0 +1,249 @@
+//! Fits of contacts together with what is not known of the detector.
+//!
+//! A round holds the patterns of what is not known (variable projection: Golub and Pereyra, 1973), steps the contacts with these in the covariance, takes the detector to its
+//! posterior's mean, and goes on from as far on the way to both as the readings agree to. While much is left, as where a contact is missing, that is taken for noise: else the
+//! detector would be bent until it explained it.
+
+use crate::circuit::Circuit;
+use crate::evidence::ln_volume;
+use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
+use crate::frame::{Errors, left_v};
+use crate::held::{Held, Kept, Parts, Room};
+use crate::normal::Normal;
+use crate::real::Real;
+use crate::solver::Task;
+use crate::table::MAX_ELECTRODES;
+use crate::unknown::{Detector, Layout, Unknown};
+
+/// Steps of contacts in a round.
+const INNER: u8 = 3;
+/// Shares of the way that are tried one after the other, each of the last; and the least.
+const SHORTER: f32 = 0.4;
+const SHORTEST: f32 = 0.02;
+/// What is left over noise (in its deviations) up to which it is noise, the least share of what was taken for noise in the round before, and how much less than that is
+/// worth another round.
+const NOISE: f32 = 1.3;
+const LEAST_SHARE: f32 = 0.2;
+const WORTH: f32 = 0.8;
+
+/// Where a fit on a detector that is not known is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OnUnknown<T, const D: usize> {
+    /// What is taken for noise, in deviations of it.
+    pub tau: T,
+    /// Squares of what is left of the readings, in true noise, and of all that was known before.
+    left: T,
+    prior: T,
+    /// Directions whose patterns are held, and whether they are those of the scene.
+    pub kept: Kept<D>,
+    pub is_held: bool,
+}
+
+impl<T: Real, const D: usize> OnUnknown<T, D> {
+    pub const NONE: Self = Self { tau: T::ONE, left: T::ZERO, prior: T::ZERO, kept: Kept::NONE, is_held: false };
+
+    fn objective(&self) -> T {
+        self.left / (self.tau * self.tau) + self.prior
+    }
+}
+
+/// What rounds are gone with.
+struct On<'a, 't, T, const K: usize> {
+    task: Task<'t, T>,
+    unknown: &'t Unknown<'t>,
+    circuit: &'a mut Circuit<T, K>,
+    parts: Parts<'a, T>,
+}
+
+impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
+    /// The circuit of a scene, solved, on its detector; `None` if it makes no sense.
+    fn solved<const D: usize>(
+        &mut self,
+        scene: &Scene<T, K, D>,
+    ) -> Option<(Detector<'_, T>, &mut Circuit<T, K>, &mut Held<'a, T>)> {
+        let table = self.task.table;
+        let Parts { moved, shares, held } = &mut self.parts;
+        let layout = Layout::of(table, self.unknown);
+        let moved = layout.moved(table, self.unknown, &scene.steps, moved, shares);
+        let detector = Detector { table, moved: Some((self.unknown, moved)) };
+        self.circuit.solve(&detector, scene.spots()).then_some((detector, &mut *self.circuit, held))
+    }
+
+    /// Squares of what a scene leaves of the readings, in noise.
+    fn left<const D: usize>(&mut self, scene: &Scene<T, K, D>) -> Option<T> {
+        let Task { table, frame, errors, .. } = self.task;
+        let (n, full_v) = (table.electrodes(), T::of(table.head().full_v));
+        let (detector, circuit, _) = self.solved(scene)?;
+        let (mut volts, mut sum) = ([T::ZERO; MAX_ELECTRODES], T::ZERO);
+        for g in 0..n {
+            circuit.row_v(&detector, g, &mut volts);
+            for e in 0..n {
+                let left_v = left_v(frame, g * n + e, full_v, detector.read_v(e, volts[e])).unwrap_or(T::ZERO);
+                sum += left_v * left_v;
+            }
+        }
+        Some(sum / errors.variance_v2).filter(|sum| sum.is_finite())
+    }
+}
+
+/// Squares of what was known of a scene before.
+fn prior<T: Real, const K: usize, const D: usize>(scene: &Scene<T, K, D>, radius_deviation: T) -> T {
+    let radii = scene.spots().iter().map(|spot| spot.ln_radius / radius_deviation);
+    radii.chain(scene.steps).map(|deviations| deviations * deviations).sum()
+}
+
+impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
+    /// Goes one round.
+    pub(crate) fn go_round(
+        &mut self,
+        task: Task<'_, T>,
+        unknown: &Unknown<'_>,
+        circuit: &mut Circuit<T, K>,
+        room: &mut Room<'_, T>,
+        work: &mut Working<'_, K>,
+    ) -> Went<T, K, D> {
+        let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K) };
+        if self.scene.count == 0 || !self.is_begun(&mut on) {
+            return Went::ToEnd(None);
+        }
+        let Some(to) = self.step_contacts(&mut on, work) else { return Went::ToEnd(None) };
+        if self.steps == 0 && to == self.scene {
+            return Went::ToEnd(self.end_round(&mut on));
+        }
+        let before = self.on.objective();
+        let is_better = self.go_towards(&to, &mut on);
+        self.on.is_held &= !is_better;
+        let is_less_noise = self.take_noise(task.readings());
+        let is_worth_it = is_better && before - self.on.objective() >= T::of(LEAST_GAIN);
+        match self.steps > 0 && (is_less_noise || is_worth_it) {
+            true => Went::On,
+            false => Went::ToEnd(self.end_round(&mut on)),
+        }
+    }
+
+    /// Finds how much is left of the readings where the fit begins, if that is not known; `false` if the scene makes no sense.
+    fn is_begun(&mut self, on: &mut On<'_, '_, T, K>) -> bool {
+        if core::mem::replace(&mut self.has_looked, true) {
+            return true;
+        }
+        let Some(left) = on.left(&self.scene) else { return false };
+        (self.on.left, self.on.prior) = (left, prior(&self.scene, self.radius_deviation));
+        let rms = (left / on.task.readings()).sqrt();
+        let tau = if rms > T::of(NOISE) { rms } else { T::ONE };
+        self.on.is_held &= tau == self.on.tau;
+        self.on.tau = tau;
+        true
+    }
+
+    /// Steps contacts with the detector's patterns held, and takes it to its posterior's mean; `None` if the scene makes no sense.
+    fn step_contacts(&mut self, on: &mut On<'_, '_, T, K>, work: &mut Working<'_, K>) -> Option<Scene<T, K, D>> {
+        let Task { table, frame, errors, .. } = on.task;
+        let (unknown, full_v) = (on.unknown, T::of(table.head().full_v));
+        let errors = Errors { variance_v2: errors.variance_v2 * self.on.tau * self.on.tau, ..*errors };
+        let mut at = self.scene;
+        let (detector, circuit, held) = on.solved(&at)?;
+        if !self.on.is_held {
+            let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
+            self.on.kept = held.hold(&detector, unknown, circuit, errors.variance_v2.sqrt(), says)?;
+            self.on.is_held = true;
+        }
+        let kept = self.on.kept;
+        held.set_state(&kept, &at.steps);
+        let mut look = |scene: &Scene<T, K, D>, normal: &mut Normal<T, K>, held: &mut Held<'_, T>| {
+            if !circuit.solve(&detector, scene.spots()) {
+                return false;
+            }
+            normal.sum_up(&detector, circuit, frame, &errors, self.radius_deviation, Some((held, kept.count)));
+            work.worked_out(scene.count);
+            normal.objective().is_finite()
+        };
+        if !look(&at, &mut self.normal, held) {
+            return None;
+        }
+        held.take(kept.count);
+        if self.steps == 0 {
+            return Some(at);
+        }
+        for _ in 0..INNER.min(self.steps) {
+            self.steps -= 1;
+            let mut is_taken = false;
+            for _ in 0..TRIES {
+                let step = self.normal.step(self.damping);
+                let Some((step, gain)) = step else {
+                    self.damping *= T::of(10.0);
+                    continue;
+                };
+                if gain < T::of(LEAST_GAIN) {
+                    break;
+                }
+                let (trial, mut normal) = (at.moved(&step, table), Normal::EMPTY);
+                if look(&trial, &mut normal, held) && normal.objective() < self.normal.objective() {
+                    (at, self.normal, is_taken) = (trial, normal, true);
+                    held.take(kept.count);
+                    self.damping = (self.damping / T::of(10.0)).max(T::of(1e-5));
+                    break;
+                }
+                self.damping *= T::of(10.0);
+            }
+            if !is_taken {
+                break;
+            }
+        }
+        self.damping = self.damping.min(T::ONE);
+        held.posterior(&kept, &mut at.steps);
+        Some(at)
+    }
+
+    /// Goes as far on the way to a scene as the readings agree to; `false` if they agree to nothing.
+    fn go_towards(&mut self, to: &Scene<T, K, D>, on: &mut On<'_, '_, T, K>) -> bool {
+        let mut share = T::ONE;
+        while share > T::of(SHORTEST) {
+            let there = self.scene.towards(to, share);
+            if let Some(left) = on.left(&there) {
+                let new = OnUnknown { left, prior: prior(&there, self.radius_deviation), ..self.on };
+                if new.objective() < self.on.objective() {
+                    (self.scene, self.on) = (there, new);
+                    return true;
+                }
+            }
+            share *= T::of(SHORTER);
+        }
+        false
+    }
+
+    /// Takes as much for noise as is left; whether that is much less than before.
+    fn take_noise(&mut self, readings: T) -> bool {
+        let rms = (self.on.left / readings).sqrt();
+        let next = if rms > T::of(NOISE) { rms.max(T::of(LEAST_SHARE) * self.on.tau) } else { T::ONE };
+        let is_less = next < T::of(WORTH) * self.on.tau;
+        if is_less {
+            self.on.tau = next;
+            self.on.is_held = false;
+        }
+        is_less
+    }
+
+    /// The fit, looked at where it ended with the patterns that are held.
+    fn end_round(&mut self, on: &mut On<'_, '_, T, K>) -> Option<Fit<T, K, D>> {
+        let Task { table, frame, errors, .. } = on.task;
+        let errors = Errors { variance_v2: errors.variance_v2 * self.on.tau * self.on.tau, ..*errors };
+        let kept = self.on.kept;
+        let (detector, circuit, held) = on.solved(&self.scene)?;
+        held.set_state(&kept, &self.scene.steps);
+        self.normal.sum_up(&detector, circuit, frame, &errors, self.radius_deviation, Some((held, kept.count)));
+        // Near enough to hold for what comes next at this scene.
+        self.on.is_held = true;
+        let steps: T = self.scene.steps.iter().map(|step| *step * *step).sum();
+        let objective = self.on.left + self.on.prior;
+        let volume = T::of(2.0) * ln_volume(table, circuit, &self.normal) - held.ln_determinant(kept.count);
+        Some(Fit {
+            scene: self.scene,
+            cost: self.on.left + steps,
+            objective,
+            evidence: volume - objective,
+            information: self.normal.information(),
+            radius_deviation: self.radius_deviation,
+            is_alone: false,
+        })
+    }
+}

@@ -1,0 +1,372 @@
+//! What is not known of a detector, compiled as its table is: how all that the table says changes with it.
+//!
+//! A detector differs from its description in independent directions, each of which has a standard deviation of one: its thickness, how uneven it is, where an electrode
+//! is, what a channel reads. Fields change nearly linearly with all of them where readings do not: what is not linear is the circuit, and that is solved exactly. So a
+//! direction is a table of changes of fields, for a disc of the usual radius, on the same grid; one whose square counts has a second table. What belongs to a board or to
+//! a pad alone needs no fields.
+
+use core::ops::Range;
+
+use crate::fields::Sample;
+use crate::real::Real;
+use crate::spline::{interval, weights};
+use crate::table::{MAX_ELECTRODES, Table};
+
+/// A change that needs no fields, for a step of one deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// Of the logarithm of what a channel reads over what is there.
+    Gain(usize, f32),
+    /// Of what a channel reads besides what is there (V).
+    Offset(usize, f32),
+    /// Of the logarithm of a pad's own impedance.
+    Pad(usize, f32),
+    /// Of the logarithm of the switch's resistance.
+    Switch(f32),
+    /// Of the height of a channel's bow (V): a parabola between the ends of its converter's range.
+    Bow(usize, f32),
+}
+
+/// A direction in which a detector may differ.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Direction {
+    /// Number of the table of changes for a step of one deviation.
+    pub table: Option<usize>,
+    /// Number of the table of second derivatives.
+    pub square: Option<usize>,
+    /// What it changes besides: numbers of changes.
+    pub changes: Range<usize>,
+}
+
+/// All that is not known of a detector of `n` electrodes, whose table has `nx` by `ny` coefficients over places and `k` over distances, in so many tables of changes.
+#[derive(Clone, Copy, Debug)]
+pub struct Unknown<'a> {
+    /// The directions.
+    pub directions: &'a [Direction],
+    /// Changes that need no fields, of all directions.
+    pub changes: &'a [Change],
+    /// How many tables there are.
+    pub tables: usize,
+    /// Coefficients of changes of the fields of the electrodes, and of the disc's own (ohm): rows of `y`, in them of `x`, for each all tables of `n + 1`.
+    pub fields_ohm: &'a [f32],
+    /// Changes of the fields between the electrodes (ohm): tables of lower triangles.
+    pub pads_ohm: &'a [f32],
+    /// Changes of the spline over distances (ohm): tables of `k`.
+    pub distances_ohm: &'a [f32],
+    /// Changes of `Q`: tables of lower triangles of `n + 1`.
+    pub walls: &'a [f32],
+    /// Ends of the range of each channel's converter (V).
+    pub ranges_v: &'a [[f32; 2]],
+    /// What is each pad's own of the impedance while it is grounded (ohm).
+    pub own_pads_ohm: &'a [f32],
+}
+
+/// How many elements a lower triangle has.
+pub(crate) const fn pairs(side: usize) -> usize {
+    side * (side + 1) / 2
+}
+
+/// An element of a symmetric matrix of which the lower triangle is there.
+pub(crate) fn of_pair<T: Copy>(triangle: &[T], a: usize, b: usize) -> T {
+    let (high, low) = if a < b { (b, a) } else { (a, b) };
+    triangle[pairs(high) + low]
+}
+
+/// Coefficients about a place, with their weights.
+pub(crate) struct Stencil<T> {
+    /// Number of the coefficient.
+    pub nodes: [usize; 16],
+    /// Weight in the value; in the derivatives by x and y (1/m); in the second ones by x twice, both, y twice (1/m2).
+    pub weights: [[T; 16]; 6],
+}
+
+impl<T: Real> Stencil<T> {
+    /// At a place (m).
+    pub fn of(table: &Table<'_>, [x_m, y_m]: [T; 2]) -> Self {
+        let ([i, j], [x, y]) = table.cell(x_m, y_m);
+        let (along_x, along_y) = (weights(x), weights(y));
+        let [per_x, per_y] = [table.head.step_x_m, table.head.step_y_m].map(|step_m| T::ONE / T::of(step_m));
+        let mut stencil = Self { nodes: [0; 16], weights: [[T::ZERO; 16]; 6] };
+        for node in 0..16 {
+            let (row, column) = (node / 4, node % 4);
+            stencil.nodes[node] = (j + row) * table.sides[0] + i + column;
+            let all = [
+                along_x.value[column] * along_y.value[row],
+                along_x.slope[column] * along_y.value[row] * per_x,
+                along_x.value[column] * along_y.slope[row] * per_y,
+                along_x.bend[column] * along_y.value[row] * per_x * per_x,
+                along_x.slope[column] * along_y.slope[row] * per_x * per_y,
+                along_x.value[column] * along_y.bend[row] * per_y * per_y,
+            ];
+            stencil.weights.iter_mut().zip(all).for_each(|(weights, weight)| weights[node] = weight);
+        }
+        stencil
+    }
+}
+
+impl Unknown<'_> {
+    /// What a direction changes besides fields.
+    pub(crate) fn changes_of(&self, direction: &Direction) -> &[Change] {
+        self.changes.get(direction.changes.clone()).unwrap_or(&[])
+    }
+
+    /// A channel's bow over its height at a voltage (V).
+    pub(crate) fn bow<T: Real>(&self, e: usize, volts: T) -> T {
+        let [low_v, high_v] = self.ranges_v.get(e).map_or([T::ZERO, T::ONE], |range_v| range_v.map(T::of));
+        let share = ((volts - low_v) / (high_v - low_v)).max(T::ZERO).min(T::ONE);
+        T::of(4.0) * share * (T::ONE - share)
+    }
+
+    /// Changes of all tables at a coefficient.
+    fn node(&self, node: usize, electrodes: usize) -> &[f32] {
+        let count = self.tables * (electrodes + 1);
+        self.fields_ohm.get(node * count..(node + 1) * count).unwrap_or(&[])
+    }
+
+    /// Adds what shares of the tables change at a place.
+    pub(crate) fn add<T: Real>(&self, table: &Table<'_>, shares: &[f32], at_m: [T; 2], sample: &mut Sample<T>) {
+        let count = table.electrodes() + 1;
+        let stencil = Stencil::of(table, at_m);
+        for (which, node) in stencil.nodes.into_iter().enumerate() {
+            let mut change = [0.0f32; MAX_ELECTRODES + 1];
+            let change = &mut change[..count];
+            for (share, of_table) in shares.iter().zip(self.node(node, table.electrodes()).chunks_exact(count)) {
+                change.iter_mut().zip(of_table).for_each(|(sum, ohm)| *sum += share * ohm);
+            }
+            let [value, x, y, xx, xy, yy] = stencil.weights.each_ref().map(|weights| weights[which]);
+            for (q, ohm) in change.iter().enumerate() {
+                let ohm = T::of(*ohm);
+                sample.value[q] += value * ohm;
+                sample.slope[0][q] += x * ohm;
+                sample.slope[1][q] += y * ohm;
+                sample.turning[0][q] += xx * ohm;
+                sample.turning[1][q] += xy * ohm;
+                sample.turning[2][q] += yy * ohm;
+            }
+        }
+    }
+
+    /// Change of the electrodes' fields at a place by a table (ohm).
+    pub(crate) fn fields_at<T: Real>(&self, electrodes: usize, which: usize, stencil: &Stencil<T>, ohm: &mut [T]) {
+        let first = which * (electrodes + 1);
+        let mut sums = [0.0f32; MAX_ELECTRODES];
+        for (node, weight) in stencil.nodes.into_iter().zip(stencil.weights[0]) {
+            let weight = weight.to_f32().unwrap_or(0.0);
+            let fields = self.node(node, electrodes).get(first..first + electrodes).unwrap_or(&[]);
+            sums.iter_mut().zip(fields).for_each(|(sum, field)| *sum += weight * field);
+        }
+        ohm.iter_mut().zip(sums).take(electrodes).for_each(|(to, sum)| *to = T::of(sum));
+    }
+}
+
+/// A detector after steps in the directions, as far as that is the same at all places. Larger by its parts than a board's stack has room for, it is kept where the
+/// solver's room is.
+#[derive(Clone, Debug)]
+pub(crate) struct Moved<'m, T> {
+    /// Steps, in deviations.
+    pub steps: &'m [T],
+    /// Share of each table.
+    pub shares: &'m [f32],
+    /// Fields between electrodes, the spline over distances, `Q`.
+    pub pads_ohm: &'m [T],
+    pub distances_ohm: &'m [T],
+    pub walls: &'m [T],
+    /// Of each channel.
+    pub gains: &'m [T],
+    pub offsets_v: &'m [T],
+    pub bows_v: &'m [T],
+    /// Own impedance of each pad, and the switch's (ohm).
+    pub own_pads_ohm: &'m [T],
+    pub switch_ohm: T,
+}
+
+/// Where that is kept.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    electrodes: usize,
+    knots: usize,
+    directions: usize,
+}
+
+/// Adds so much of one of equal parts.
+fn add<T: Real>(sums: &mut [T], share: T, parts: &[f32], which: usize) {
+    let count = sums.len();
+    let part = parts.get(which * count..(which + 1) * count).unwrap_or(&[]);
+    sums.iter_mut().zip(part).for_each(|(sum, ohm)| *sum += share * T::of(*ohm));
+}
+
+impl Layout {
+    pub fn of(table: &Table<'_>, unknown: &Unknown<'_>) -> Self {
+        Self { electrodes: table.electrodes(), knots: table.knots(), directions: unknown.directions.len() }
+    }
+
+    fn counts(&self) -> [usize; 8] {
+        let n = self.electrodes;
+        [self.directions, pairs(n), self.knots, pairs(n + 1), n, n, n, n + 1]
+    }
+
+    /// How many numbers it takes.
+    pub fn numbers(&self) -> usize {
+        self.counts().iter().sum()
+    }
+
+    /// Works out what steps make of a detector.
+    pub fn moved<'m, T: Real>(
+        &self,
+        table: &Table<'_>,
+        unknown: &Unknown<'_>,
+        steps: &[T],
+        numbers: &'m mut [T],
+        shares: &'m mut [f32],
+    ) -> Moved<'m, T> {
+        let mut rest = numbers;
+        let mut part = |count: usize| {
+            let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
+            rest = after;
+            part
+        };
+        let [own, pads, distances, walls, gains, offsets, bows, last] = self.counts().map(&mut part);
+        own.copy_from_slice(&steps[..self.directions]);
+        table.parts([&mut *pads, &mut *distances, &mut *walls]);
+        let n = self.electrodes;
+        gains.fill(T::ZERO);
+        offsets.fill(T::ZERO);
+        bows.fill(T::ZERO);
+        last.fill(T::ZERO);
+        shares.fill(0.0);
+        for (direction, step) in unknown.directions.iter().zip(steps.iter().copied()) {
+            let half_square = T::of(0.5) * step * step;
+            for (which, share) in [(direction.table, step), (direction.square, half_square)] {
+                let Some(which) = which.filter(|_| share != T::ZERO) else { continue };
+                shares[which] = share.to_f32().unwrap_or(0.0);
+                add(pads, share, unknown.pads_ohm, which);
+                add(distances, share, unknown.distances_ohm, which);
+                add(walls, share, unknown.walls, which);
+            }
+            for change in unknown.changes_of(direction) {
+                match *change {
+                    Change::Gain(e, log) => gains[e] += step * T::of(log),
+                    Change::Offset(e, volts) => offsets[e] += step * T::of(volts),
+                    Change::Pad(e, log) => last[e] += step * T::of(log),
+                    Change::Bow(e, height_v) => bows[e] += step * T::of(height_v),
+                    Change::Switch(log) => last[n] += step * T::of(log),
+                }
+            }
+        }
+        gains.iter_mut().for_each(|gain| *gain = gain.exp());
+        for e in 0..n {
+            let own_ohm = T::of(unknown.own_pads_ohm[e]);
+            let factor = last[e].exp();
+            pads[pairs(e) + e] += own_ohm * (factor - T::ONE);
+            last[e] = own_ohm * factor;
+        }
+        let switch_ohm = T::of(table.head().on_resistance_ohm) * last[n].exp();
+        Moved {
+            steps: own,
+            shares,
+            pads_ohm: pads,
+            distances_ohm: distances,
+            walls,
+            gains,
+            offsets_v: offsets,
+            bows_v: bows,
+            own_pads_ohm: &last[..n],
+            switch_ohm,
+        }
+    }
+}
+
+/// A detector as a circuit sees it: as its table says, or moved from there.
+#[derive(Clone, Debug)]
+pub(crate) struct Detector<'a, T> {
+    pub table: &'a Table<'a>,
+    pub moved: Option<(&'a Unknown<'a>, Moved<'a, T>)>,
+}
+
+impl<'a, T: Real> Detector<'a, T> {
+    /// As its table says.
+    pub fn described(table: &'a Table<'a>) -> Self {
+        Self { table, moved: None }
+    }
+
+    /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives.
+    pub fn sample(&self, at_m: [T; 2], wide: T, sample: &mut Sample<T>) {
+        self.table.sample(at_m, wide, sample);
+        if let Some((unknown, moved)) = &self.moved {
+            unknown.add(self.table, moved.shares, at_m, sample);
+        }
+    }
+
+    /// Field between two electrodes (ohm).
+    pub fn pads_ohm(&self, e: usize, g: usize) -> T {
+        match &self.moved {
+            Some((_, moved)) => of_pair(moved.pads_ohm, e, g),
+            None => T::of(self.table.pads_ohm(e, g)),
+        }
+    }
+
+    /// Resistance of a switch (ohm).
+    pub fn switch_ohm(&self) -> T {
+        self.moved.as_ref().map_or_else(|| T::of(self.table.head().on_resistance_ohm), |(_, moved)| moved.switch_ohm)
+    }
+
+    /// What a channel makes of a voltage, but for what the table says of it (V).
+    pub fn read_v(&self, e: usize, volts: T) -> T {
+        self.moved.as_ref().map_or(volts, |(unknown, moved)| {
+            moved.gains[e] * volts + moved.offsets_v[e] + moved.bows_v[e] * unknown.bow(e, volts)
+        })
+    }
+
+    /// What a channel makes of a small change.
+    pub fn gain(&self, e: usize) -> T {
+        self.moved.as_ref().map_or(T::ONE, |(_, moved)| moved.gains[e])
+    }
+
+    /// The part of the field between places that goes by their distance (m): its value (ohm), and its derivative by that (ohm/m).
+    pub fn by_distance_ohm(&self, distance_m: T) -> (T, T) {
+        let at = |k: usize| {
+            self.moved.as_ref().map_or_else(|| T::of(self.table.distance_ohm(k)), |(_, moved)| moved.distances_ohm[k])
+        };
+        let knots = Knots::of(self.table, distance_m);
+        let sum = |weights: &[T; 4]| (0..4).map(|k| weights[k] * at(knots.first + k)).sum::<T>();
+        (sum(&knots.value), sum(&knots.slope))
+    }
+
+    /// `Q b` of the fields at a place.
+    pub fn by_walls(&self, fields_ohm: &[T], products: &mut [T; MAX_ELECTRODES + 1]) {
+        match &self.moved {
+            Some((_, moved)) => walled(|a, b| of_pair(moved.walls, a, b), fields_ohm, products),
+            None => walled(|a, b| T::of(self.table.walls.of_pair(a, b)), fields_ohm, products),
+        }
+    }
+}
+
+/// `Q b` of the fields at a place.
+fn walled<T: Real>(walls: impl Fn(usize, usize) -> T, fields_ohm: &[T], products: &mut [T; MAX_ELECTRODES + 1]) {
+    let n = fields_ohm.len();
+    for (row, product) in products.iter_mut().enumerate().take(n + 1) {
+        let sum: T = fields_ohm.iter().enumerate().map(|(s, u)| walls(row, s) * *u).sum();
+        *product = sum + walls(row, n);
+    }
+}
+
+/// Coefficients over distances, with their weights.
+pub(crate) struct Knots<T> {
+    /// The first of four.
+    pub first: usize,
+    /// Weights in the value, and in the derivative by the distance (1/m).
+    pub value: [T; 4],
+    slope: [T; 4],
+}
+
+impl<T: Real> Knots<T> {
+    /// At a distance (m).
+    pub fn of(table: &Table<'_>, distance_m: T) -> Self {
+        let [near_m, ln_step] = [table.head.near_m, table.head.ln_step].map(T::of);
+        // Nearer than that there is no second contact.
+        let distance_m = distance_m.max(near_m);
+        let (first, t) = interval((distance_m / near_m).ln() / ln_step, table.knots() - 3);
+        let weights = weights(t);
+        Self { first, value: weights.value, slope: weights.slope.map(|slope| slope / (ln_step * distance_m)) }
+    }
+}
