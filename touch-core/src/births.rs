@@ -37,8 +37,9 @@ pub(crate) struct Births<'a, 'h, T, const K: usize, const D: usize> {
     pub normal: &'a Normal<T, K>,
     pub held: &'a mut Held<'h, T>,
     pub kept: &'a Kept<D>,
-    /// What is taken for noise (V).
+    /// What is taken for noise (V), and how much more that is than noise is.
     pub noise_v: T,
+    pub tau: T,
 }
 
 impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
@@ -70,7 +71,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
             let square = self.new_square(change, &factor);
             let ln_ohm = held_ohm((square / along).max(own_ohm).ln(), table);
             let spot = Spot { at_m: table.middle_m(i, j), ln_ohm, ln_radius: T::ZERO };
-            let gain = along * along / square;
+            let gain = self.tau * self.tau * along * along / square;
             take(best, Candidate { spot, gain }, T::of(APART) * T::of(table.head().radius_m));
         }
     }

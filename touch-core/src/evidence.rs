@@ -11,6 +11,7 @@
 //! the other. Places are alike likely all over the detector; contacts have no order, so that `K!` fits are the same.
 
 use crate::circuit::Circuit;
+use crate::fit::Fit;
 use crate::normal::{ANY_RADIUS, Normal};
 use crate::real::Real;
 use crate::table::Table;
@@ -18,7 +19,15 @@ use crate::table::Table;
 /// Standard deviation of the logarithm of a conductance before anything is read: nearly nothing is known.
 const CONDUCTANCE_DEVIATION: f32 = 4.0;
 /// One more contact is less likely than one fewer by so many nats before anything is read: scenes of few contacts are more common.
-const FEWER_NATS: f32 = 1.5;
+const FEWER_NATS: f32 = 5.0;
+
+/// What one more contact has to gain, in the linear theory, for it to be tried, and what readings have to say for one that is followed (squared deviations): seven for
+/// each number that they determine.
+pub(crate) const MORE_GAIN: f32 = 7.0 * PAID;
+/// Numbers of a contact that readings determine: a radius that they do not tell says nothing.
+const PAID: f32 = 3.0;
+/// Standard deviations of the sum of squares beyond which readings do not fit: the host's.
+const MISFIT_DEVIATIONS: f32 = 5.0;
 
 /// Logarithm of the evidence for contacts but for the sum of squares: of the share of what could be before that the readings leave (nats).
 pub(crate) fn ln_volume<T: Real, const K: usize>(
@@ -38,4 +47,40 @@ pub(crate) fn ln_volume<T: Real, const K: usize>(
     let of_one = peaks - (sides[0] * sides[1]).ln() - T::of(FEWER_NATS);
     let all = (0..circuit.count).map(|k| of_one + T::of(k as u32 + 1).ln() + circuit.loaded[k].ln_over_contact());
     all.sum::<T>() - T::of(0.5) * ln_determinant
+}
+
+pub(crate) fn freedom<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> T {
+    T::of(PAID) * T::of(fit.scene.count as u32)
+}
+
+/// Sum of squares of so many normal numbers beyond which they are not those of noise.
+pub(crate) fn limit<T: Real>(freedom: T) -> T {
+    let freedom = freedom.max(T::ONE);
+    freedom + T::of(MISFIT_DEVIATIONS) * (T::of(2.0) * freedom).sqrt()
+}
+
+pub(crate) fn is_misfit<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>, readings: T) -> bool {
+    fit.cost > limit(readings - freedom(fit))
+}
+
+/// What is left of the evidence: of two explanations the lower one is believed.
+pub(crate) fn score<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> T {
+    -fit.evidence
+}
+
+pub(crate) fn better<T: Real, const K: usize, const D: usize>(
+    a: Option<Fit<T, K, D>>,
+    b: Option<Fit<T, K, D>>,
+) -> Option<Fit<T, K, D>> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if score(&b) < score(&a) { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// The contact that the readings speak least for, if that is less than its price.
+pub(crate) fn weakest<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> Option<usize> {
+    let all = &fit.information;
+    let least = (0..fit.scene.count).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
+    (all[least] < T::of(MORE_GAIN)).then_some(least)
 }

@@ -21,6 +21,10 @@ const FIRST_DAMPING: f32 = 1e-3;
 const LEAST_DAMPING: f32 = 1e-5;
 const DAMPING_STEP: f32 = 10.0;
 pub(crate) const TRIES: u8 = 4;
+/// Steps at most where a start is only tried, and what a round of these, or of others, has to gain (squared deviations) for another one.
+pub(crate) const TRYING: u8 = 8;
+const ROUGHLY: f32 = 3.0;
+const EXACTLY: f32 = 0.3;
 /// Radii, as logarithms over the usual one: from a fifth of it to three times it.
 pub(crate) const LN_RADII: [f32; 2] = [-1.6, 1.1];
 /// Resistances, as logarithms of those of a square of the layer: a contact of 1e-6 squares is nothing, and none leads better than a fifth of one.
@@ -146,9 +150,8 @@ impl<const K: usize> Default for Work<K> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fit<T, const K: usize, const D: usize> {
     pub scene: Scene<T, K, D>,
-    /// Sum of squares of what they leave and of the detector's steps, and the same with what was known of radii before.
+    /// Sum of squares of what they leave and of the detector's steps.
     pub cost: T,
-    pub objective: T,
     /// Twice the logarithm of the evidence for them, less all that is the same for all explanations.
     pub evidence: T,
     /// What the readings say for each contact (squared deviations).
@@ -164,7 +167,6 @@ impl<T: Real, const K: usize, const D: usize> Fit<T, K, D> {
     pub const NONE: Self = Self {
         scene: Scene::EMPTY,
         cost: T::ZERO,
-        objective: T::ZERO,
         evidence: T::ZERO,
         information: [T::ZERO; K],
         radius_deviation: T::ZERO,
@@ -202,6 +204,8 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     pub(crate) steps: u8,
     tries: u8,
     pub(crate) has_looked: bool,
+    /// What another round has to gain (squared deviations).
+    pub(crate) worth: T,
     /// What is not known of a detector.
     pub(crate) on: OnUnknown<T, D>,
 }
@@ -217,12 +221,14 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         steps: 0,
         tries: 0,
         has_looked: false,
+        worth: T::ZERO,
         on: OnUnknown::NONE,
     };
 
     /// Begins to step from a scene to where it fits best, so many steps at most.
     pub fn begin(&mut self, scene: Scene<T, K, D>, radius_deviation: T, steps: u8) {
         self.on.is_held &= scene == self.scene;
+        self.worth = T::of(if steps <= TRYING { ROUGHLY } else { EXACTLY });
         (self.scene, self.trial, self.radius_deviation) = (scene, scene, radius_deviation);
         (self.damping, self.steps, self.tries, self.has_looked) = (T::of(FIRST_DAMPING), steps, 0, false);
     }
@@ -277,12 +283,10 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     fn fit(&self, task: Task<'_, T>, circuit: &Circuit<T, K>) -> Fit<T, K, D> {
-        let (cost, objective) = (self.normal.cost, self.normal.objective());
         Fit {
             scene: self.scene,
-            cost,
-            objective,
-            evidence: ln_volume(task.table, circuit, &self.normal) * T::of(2.0) - objective,
+            cost: self.normal.cost,
+            evidence: T::of(2.0) * ln_volume(task.table, circuit, &self.normal) - self.normal.objective(),
             information: self.normal.information(),
             radius_deviation: self.radius_deviation,
             is_alone: false,

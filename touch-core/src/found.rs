@@ -242,10 +242,13 @@ fn a_contact_that_has_lifted_is_gone_where_all_readings_are_at_a_floor() {
     }
 }
 
+/// What a contact costs in these fits (squared deviations).
+const PRICE: f32 = 21.0;
+
 /// A fit of so many contacts that leaves so much, and says so much for each.
 fn fit(contacts: usize, cost: f32, information: f32) -> Fit {
     let scene = (0..contacts).fold(Scene::EMPTY, |scene, k| scene.with(spot(0.01 * k as f32, 0.0, 1.0)));
-    Fit { scene, cost, objective: cost, information: [information; 3], ..Fit::NONE }
+    Fit { scene, cost, evidence: -cost - PRICE * scene.count as f32, information: [information; 3], ..Fit::NONE }
 }
 
 fn starts(gains: &[f32]) -> Candidates<f32> {
@@ -289,7 +292,7 @@ fn a_search_grows_exchanges_and_reduces() {
     let mut search = Search::NONE;
     let wants = search.begin(None, Some(starts(&[59.0])), 240.0);
     assert!(matches!(wants, Wants::Nothing(None)));
-    // Two contacts, each worth it: tried with usual radii, then fitted with any.
+    // Two contacts, each worth it: one leaves so much that it need not be found exactly, two are tried with usual radii, then fitted with any.
     let costs = [0.0, 5000.0, 240.0, 239.0];
     let by_count =
         |scene: &Scene, _| Some(fit(scene.count, costs[scene.count], 2000.0)).filter(|fit| fit.scene.count > 0);
@@ -298,7 +301,7 @@ fn a_search_grows_exchanges_and_reduces() {
     let (asked, found) = run(&mut search, wants, by_count, gains);
     assert_eq!(found.unwrap().scene.count, 2);
     let [usual, any] = [USUAL_RADIUS, ANY_RADIUS];
-    assert_eq!(asked, [(1, usual), (1, usual), (1, any), (2, usual), (2, usual), (2, any)]);
+    assert_eq!(asked, [(1, usual), (2, usual), (2, any)]);
     assert!(!search.more);
     // What was followed and fits is taken on; what left room for more is not.
     let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0);

@@ -10,6 +10,7 @@
 //! and the posterior's mean of the steps is `L'^-1 L^-1 p' r / sqrt(v)`.
 
 use crate::circuit::Circuit;
+use crate::lanes::at_once;
 use crate::patterns::Patterns;
 use crate::real::Real;
 use crate::table::Table;
@@ -17,7 +18,7 @@ use crate::unknown::{Detector, Layout, Unknown};
 use crate::vector::PARAMETERS;
 
 /// Square of a pattern, in noise, below which its direction is left out: it changes a sum of squares by no more.
-const LEAST_SQUARE: f32 = 0.1;
+const LEAST_SQUARE: f32 = 0.3;
 
 /// Room for a detector that is not known, as much as [`Room::numbers`] and [`Unknown::tables`] say. What is in it before does not matter; it is to be given again with the
 /// next piece of work.
@@ -148,23 +149,12 @@ impl<T: Real> Held<'_, T> {
     }
 
     fn factorise(&mut self, count: usize) -> Option<()> {
-        let matrix = &mut self.factor[..count * count];
-        gram(&self.patterns[..self.there_v.len() * count], count, matrix);
-        (0..count).for_each(|i| matrix[i * count + i] += T::ONE);
-        for i in 0..count {
-            let (above, rest) = matrix.split_at_mut(i * count);
-            let row = &mut rest[..count];
-            for (j, other) in above.chunks_exact(count).enumerate() {
-                row[j] = (row[j] - dot(&row[..j], &other[..j])) / other[j];
-            }
-            let square = row[i] - dot(&row[..i], &row[..i]);
-            // One at least, but for rounding.
-            if !(square > T::of(0.5) && square.is_finite()) {
-                return None;
-            }
-            row[i] = square.sqrt();
-        }
-        Some(())
+        let Self { patterns, factor, there_v, .. } = self;
+        let rows = there_v.len();
+        at_once(
+            #[inline(always)]
+            || factorise(&patterns[..rows * count], count, &mut factor[..count * count]),
+        )
     }
 
     /// Notes where the detector is.
@@ -174,36 +164,44 @@ impl<T: Real> Held<'_, T> {
         }
     }
 
-    /// Begins a look at contacts of so many parameters.
-    pub fn begin(&mut self, count: usize, parameters: usize) {
-        self.products[..count].fill(T::ZERO);
-        self.columns[..count * parameters].fill(T::ZERO);
+    /// Begins a look.
+    pub fn begin(&mut self) {
         self.slopes.fill(T::ZERO);
         self.left.fill(T::ZERO);
     }
 
-    /// Adds a reading, of which so much is left beside where the detector is, with its derivatives by the parameters (V); returns what the detector's steps are of it,
+    /// Notes a reading, of which so much is left beside where the detector is, with its derivatives by the parameters (V); returns what the detector's steps are of it,
     /// in noise.
-    pub fn add(&mut self, index: usize, count: usize, noise_v: T, left_v: T, slope: &[T]) -> T {
-        let pattern = &self.patterns[index * count..(index + 1) * count];
+    pub fn add(&mut self, index: usize, noise_v: T, left_v: T, slope: &[T]) -> T {
         let state = self.state[index];
-        let left_v = left_v + noise_v * state;
-        self.left[index] = left_v / noise_v;
+        self.left[index] = left_v / noise_v + state;
         self.slopes[index * slope.len()..(index + 1) * slope.len()].copy_from_slice(slope);
-        self.products.iter_mut().zip(pattern).for_each(|(sum, value)| *sum += left_v * *value);
-        for (column, slope) in self.columns.chunks_exact_mut(count.max(1)).zip(slope) {
-            column.iter_mut().zip(pattern).for_each(|(sum, value)| *sum += *slope * *value);
-        }
         state
     }
 
-    /// Ends the look: products, times `scale`, are projected.
+    /// The patterns of a reading, in noise.
+    #[cfg(test)]
+    pub fn pattern(&self, index: usize, count: usize) -> &[T] {
+        &self.patterns[index * count..(index + 1) * count]
+    }
+
+    /// Ends the look at contacts of so many parameters: products of what is left, and of the derivatives times `scale`, with the patterns are projected.
     pub fn project(&mut self, count: usize, parameters: usize, scale: T) {
-        let vectors = self.columns.chunks_exact_mut(count.max(1)).take(parameters);
-        for vector in vectors.chain(core::iter::once(&mut self.products[..count])) {
-            vector.iter_mut().for_each(|value| *value *= scale);
-            forward(self.factor, count, vector);
-        }
+        let Self { patterns, slopes, left, products, columns, factor, .. } = self;
+        let rows = left.len();
+        at_once(
+            #[inline(always)]
+            || {
+                let patterns = &patterns[..rows * count];
+                multiply(patterns, count, left, 1, 0, &mut products[..count]);
+                forward(factor, count, &mut products[..count]);
+                for (which, column) in columns.chunks_exact_mut(count.max(1)).enumerate().take(parameters) {
+                    multiply(patterns, count, slopes, parameters, which, column);
+                    column.iter_mut().for_each(|value| *value *= scale);
+                    forward(factor, count, column);
+                }
+            },
+        );
     }
 
     /// `L^-1 p' r`, and `L^-1 p' J`: a row a parameter.
@@ -262,7 +260,55 @@ impl<T: Real> Held<'_, T> {
     }
 }
 
+/// `L` of `I + p' p`; `None` if rounding has the say.
+#[inline(always)]
+fn factorise<T: Real>(patterns: &[T], count: usize, matrix: &mut [T]) -> Option<()> {
+    gram(patterns, count, matrix);
+    (0..count).for_each(|i| matrix[i * count + i] += T::ONE);
+    for i in 0..count {
+        let (above, rest) = matrix.split_at_mut(i * count);
+        let row = &mut rest[..count];
+        for (j, other) in above.chunks_exact(count).enumerate() {
+            row[j] = (row[j] - dot(&row[..j], &other[..j])) / other[j];
+        }
+        let square = row[i] - dot(&row[..i], &row[..i]);
+        // One at least, but for rounding.
+        if !(square > T::of(0.5) && square.is_finite()) {
+            return None;
+        }
+        row[i] = square.sqrt();
+    }
+    Some(())
+}
+
+/// `p' v`, of a vector whose elements are `stride` apart from `first` on, four rows of `p` at once.
+#[inline(always)]
+fn multiply<T: Real>(rows: &[T], count: usize, vector: &[T], stride: usize, first: usize, product: &mut [T]) {
+    product.fill(T::ZERO);
+    if count == 0 {
+        return;
+    }
+    for (at, four) in rows.chunks(4 * count).enumerate() {
+        let factor = |row: usize| vector[(4 * at + row) * stride + first];
+        if four.len() == 4 * count {
+            let [fa, fb, fc, fd] = [0, 1, 2, 3].map(factor);
+            let (a, rest) = four.split_at(count);
+            let (b, rest) = rest.split_at(count);
+            let (c, d) = rest.split_at(count);
+            for ((((sum, a), b), c), d) in product.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+                *sum += fa * *a + fb * *b + fc * *c + fd * *d;
+            }
+        } else {
+            for (row, part) in four.chunks_exact(count).enumerate() {
+                let factor = factor(row);
+                product.iter_mut().zip(part).for_each(|(sum, value)| *sum += factor * *value);
+            }
+        }
+    }
+}
+
 /// `L^-1` of a vector, with `L` row by row.
+#[inline(always)]
 pub(crate) fn forward<T: Real>(factor: &[T], count: usize, vector: &mut [T]) {
     for (i, row) in factor.chunks_exact(count.max(1)).enumerate().take(count) {
         vector[i] = (vector[i] - dot(&row[..i], &vector[..i])) / row[i];
@@ -280,6 +326,7 @@ fn backward<T: Real>(factor: &[T], count: usize, vector: &mut [T]) {
 }
 
 /// Scalar product, in four sums for a processor to do at once.
+#[inline(always)]
 pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut sums = [T::ZERO; 4];
@@ -289,7 +336,8 @@ pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     sums.into_iter().sum::<T>() + a_rest.iter().zip(b_rest).map(|(a, b)| *a * *b).sum::<T>()
 }
 
-/// Lower triangle of `p' p`, four rows of `p` at once: their number is one of four.
+/// Lower triangle of `p' p`, four rows of `p` at once.
+#[inline(always)]
 fn gram<T: Real>(rows: &[T], count: usize, matrix: &mut [T]) {
     matrix.fill(T::ZERO);
     if count == 0 {

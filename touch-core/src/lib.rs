@@ -34,6 +34,7 @@ mod found;
 mod frame;
 mod head;
 mod held;
+mod lanes;
 #[cfg(test)]
 mod laws;
 mod normal;
@@ -49,7 +50,10 @@ pub mod spline;
 pub mod table;
 #[cfg(test)]
 mod tests;
+mod told;
 mod unknown;
+#[cfg(test)]
+mod unknown_tests;
 mod vector;
 
 pub use self::answer::{Answer, Contact, Flags};

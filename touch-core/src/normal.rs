@@ -53,8 +53,8 @@ impl<T: Real, const K: usize> Normal<T, K> {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         let (table, head, n) = (detector.table, detector.table.head(), detector.table.electrodes());
         let noise_v = errors.variance_v2.sqrt();
-        if let Some((held, count)) = &mut held {
-            held.begin(*count, self.count);
+        if let Some((held, _)) = &mut held {
+            held.begin();
         }
         let mut volts = [T::ZERO; MAX_ELECTRODES];
         for g in 0..n {
@@ -70,9 +70,9 @@ impl<T: Real, const K: usize> Normal<T, K> {
                     let pattern = Pattern::of(one, T::of(head.radius_m), |values| values[e]);
                     slopes.add(circuit, k, &pattern, T::ONE - volts[e] / T::of(head.drive_v), &mut slope);
                 }
-                if let Some((held, count)) = &mut held {
+                if let Some((held, _)) = &mut held {
                     slope.iter_mut().for_each(|slope| *slope *= detector.gain(e));
-                    left_v += noise_v * held.add(index, *count, noise_v, left_v, &slope[..self.count]);
+                    left_v += noise_v * held.add(index, noise_v, left_v, &slope[..self.count]);
                 }
                 if frame.says_at(index) != Says::AtMost {
                     let by_strength = slope.iter().skip(STRENGTH).step_by(PARAMETERS);

@@ -10,6 +10,7 @@
 //! which is fitted; of the couples, and of how current crowds, the change is left out.
 
 use crate::circuit::Circuit;
+use crate::lanes::at_once;
 use crate::real::Real;
 use crate::table::MAX_ELECTRODES;
 use crate::unknown::{Change, Detector, Knots, Stencil, Unknown, of_pair, pairs};
@@ -46,6 +47,14 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
 
     /// Changes of all readings (V) by one deviation in each direction: rows of readings, each of as many numbers as there are directions.
     pub fn write(&self, volts: &mut [T]) {
+        at_once(
+            #[inline(always)]
+            || self.write_all(volts),
+        );
+    }
+
+    #[inline(always)]
+    fn write_all(&self, volts: &mut [T]) {
         let stride = self.unknown.directions.len();
         volts.fill(T::ZERO);
         for (column, direction) in self.unknown.directions.iter().enumerate() {
@@ -60,6 +69,7 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
     }
 
     /// Adds so much of what a table changes.
+    #[inline(always)]
     fn add_fields(&self, which: usize, share: T, column: usize, stride: usize, volts: &mut [T]) {
         let (circuit, n) = (self.circuit, self.detector.table.electrodes());
         let pads_ohm = &self.unknown.pads_ohm[which * pairs(n)..(which + 1) * pairs(n)];
@@ -97,6 +107,7 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
     }
 
     /// Adds what changes of a column of the impedances (ohm) change in a row of readings.
+    #[inline(always)]
     fn add_row(&self, g: usize, share: T, ohm: &[T], column: usize, stride: usize, volts: &mut [T]) {
         let n = self.detector.table.electrodes();
         let drive_v = T::of(self.detector.table.head().drive_v);
@@ -108,6 +119,7 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
     }
 
     /// Change of the field between two contacts by a table (ohm).
+    #[inline(always)]
     fn between_ohm(&self, which: usize, contacts: [usize; 2], fields: &[[T; MAX_ELECTRODES]; K]) -> T {
         let (table, n) = (self.detector.table, self.detector.table.electrodes());
         let [one, other] = contacts.map(|k| &self.circuit.loaded[k]);

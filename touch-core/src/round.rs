@@ -16,7 +16,7 @@ use crate::table::MAX_ELECTRODES;
 use crate::unknown::{Detector, Layout, Unknown};
 
 /// Steps of contacts in a round.
-const INNER: u8 = 3;
+const INNER: u8 = 2;
 /// Shares of the way that are tried one after the other, each of the last; and the least.
 const SHORTER: f32 = 0.4;
 const SHORTEST: f32 = 0.02;
@@ -114,7 +114,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let is_better = self.go_towards(&to, &mut on);
         self.on.is_held &= !is_better;
         let is_less_noise = self.take_noise(task.readings());
-        let is_worth_it = is_better && before - self.on.objective() >= T::of(LEAST_GAIN);
+        let is_worth_it = is_better && before - self.on.objective() >= self.worth;
         match self.steps > 0 && (is_less_noise || is_worth_it) {
             true => Went::On,
             false => Went::ToEnd(self.end_round(&mut on)),
@@ -234,13 +234,11 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         // Near enough to hold for what comes next at this scene.
         self.on.is_held = true;
         let steps: T = self.scene.steps.iter().map(|step| *step * *step).sum();
-        let objective = self.on.left + self.on.prior;
         let volume = T::of(2.0) * ln_volume(table, circuit, &self.normal) - held.ln_determinant(kept.count);
         Some(Fit {
             scene: self.scene,
             cost: self.on.left + steps,
-            objective,
-            evidence: volume - objective,
+            evidence: volume - self.on.left - self.on.prior,
             information: self.normal.information(),
             radius_deviation: self.radius_deviation,
             is_alone: false,

@@ -1,25 +1,23 @@
 //! The search for what explains a frame: what is to be done next, and what becomes of what was found by that. The work itself is the [solver](crate::Solver)'s,
 //! who does it piece by piece.
 
-use crate::fit::{Fit, Scene};
+use crate::evidence::{MORE_GAIN, better, is_misfit, limit, score, weakest};
+use crate::fit::{Fit, Scene, TRYING};
 use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
 use crate::real::Real;
 use crate::scan::{CANDIDATES, Candidates, no_candidates};
 
-/// Price of a parameter (squared deviations): that of the host's search.
-const PARAMETER_PRICE: f32 = 7.0;
-/// Parameters of a contact that have to be paid: a radius that the readings do not tell says nothing.
-const PAID: f32 = 3.0;
 /// Gain in the sum of squares, in the linear theory, for there being any contact at all, the host's; also for there being more than were found. Of 120 random
 /// scenes of three discs on `square-60` 62 are explained by three contacts: with 60 it is said of 3 that there are more, with 30 of 10. Of 201 scenes in
 /// which `auto` finds four or five it is said of 176 and of 188.
 pub(crate) const FIRST_GAIN: f32 = 60.0;
-/// Standard deviations of the sum of squares beyond which readings do not fit: the host's.
-const MISFIT_DEVIATIONS: f32 = 5.0;
+/// Squares that are left, in those of a misfit, above which more contacts are there for sure.
+const MOST_OF: f32 = 8.0;
 /// What the readings say for a contact whose strength they tell to 3 %: that one is there (squared deviations, one over the square of that).
 const SURE: f32 = 1000.0;
-/// Steps at most where a start is tried, and where the best of them is searched.
-const TRYING: u8 = 8;
+/// By how much a contact that was looked for anew has to be better (squared deviations): of two that are alike the first stays.
+const BETTER: f32 = 7.0;
+/// Steps at most where the best start is searched.
 const SEARCHING: u8 = 20;
 
 /// What a search needs done next.
@@ -150,18 +148,38 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                 self.tried = better(self.tried, found);
                 let next = usize::from(number) + 1;
                 let fits = self.tried.is_some_and(|tried| !is_misfit(&tried, readings));
+                let leaves_most = self.tried.filter(|tried| self.leaves_most(tried, readings));
+                if let (Some(tried), 0) = (leaves_most, self.at.scene.count) {
+                    // Others of the first are on the same hill.
+                    return self.grow_beyond(tried);
+                }
                 if !fits && self.starts.get(next).is_some_and(|start| start.gain > T::ZERO) {
-                    return self.start(next);
+                    return self.start(next, readings);
                 }
                 let Some(tried) = self.tried else { return self.added(None, readings) };
+                if let Some(tried) = leaves_most {
+                    return self.grow_beyond(tried);
+                }
+                if fits && !self.completes {
+                    return self.grow_on(tried);
+                }
                 self.awaits = Awaits::Best;
                 Wants::Fit(tried.scene, self.radius_deviation(), SEARCHING)
             }
             Awaits::Best => self.added(found, readings),
-            Awaits::Pruned => {
-                self.best = found;
-                self.prune(readings)
-            }
+            Awaits::Pruned => match (self.best, found) {
+                (Some(best), Some(fewer)) if score(&fewer) < score(&best) => {
+                    self.best = found;
+                    self.prune(readings)
+                }
+                // A contact alone has to be told.
+                (_, None) => {
+                    self.best = None;
+                    self.prune(readings)
+                }
+                // The readings do not tell how strong it is, but that it is there.
+                _ => self.complete(readings),
+            },
             Awaits::Rest => match found {
                 Some(rest) => self.grow(rest),
                 None => self.exchanged(readings),
@@ -178,25 +196,30 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     pub fn placed(&mut self, readings: T) -> Wants<T, K, D> {
         let gain = self.starts[0].gain;
         match self.awaits {
-            Awaits::More if gain <= T::of(PAID * PARAMETER_PRICE) => {
+            Awaits::More if gain <= T::of(MORE_GAIN) && self.best.is_none() => self.grow_on(self.at),
+            Awaits::More if gain <= T::of(MORE_GAIN) => {
                 // With any radii they leave still less.
                 let count = self.at.scene.count;
                 self.best = self.best.map(|best| Fit { is_alone: best.scene.count == count, ..best });
                 self.grown(readings)
             }
-            Awaits::More => self.start_above(T::of(PAID * PARAMETER_PRICE), false),
+            Awaits::More => self.start_above(T::of(MORE_GAIN), false, readings),
             Awaits::First if gain < T::of(FIRST_GAIN) => {
                 self.best = self.kept;
                 self.prune(readings)
             }
             Awaits::First => {
                 (self.at, self.best) = (Fit::NONE, None);
-                self.start_above(T::ZERO, false)
+                self.start_above(T::ZERO, false, readings)
             }
             Awaits::Another => {
                 self.more = gain > T::of(FIRST_GAIN);
                 let is_full = self.best.is_some_and(|best| best.scene.count == K);
-                if self.more && !is_full { self.start_above(T::of(FIRST_GAIN), true) } else { self.completed(readings) }
+                if self.more && !is_full {
+                    self.start_above(T::of(FIRST_GAIN), true, readings)
+                } else {
+                    self.completed(readings)
+                }
             }
             _ => Wants::Nothing(self.best_so_far()),
         }
@@ -216,6 +239,17 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     fn grow_on(&mut self, at: Fit<T, K, D>) -> Wants<T, K, D> {
         (self.at, self.awaits) = (at, Awaits::Grown);
         Wants::Fit(at.scene, T::of(ANY_RADIUS), SEARCHING)
+    }
+
+    /// Whether so much is left of the readings that more contacts are there for sure, and fewer need not be found exactly.
+    fn leaves_most(&self, tried: &Fit<T, K, D>, readings: T) -> bool {
+        !self.completes && tried.scene.count < K && tried.cost > T::of(MOST_OF) * limit(readings)
+    }
+
+    /// Looks for one more beside contacts that are found roughly.
+    fn grow_beyond(&mut self, tried: Fit<T, K, D>) -> Wants<T, K, D> {
+        (self.at, self.best, self.awaits) = (tried, None, Awaits::More);
+        Wants::Beside(tried.scene, tried.radius_deviation)
     }
 
     /// No more contacts are worth their price.
@@ -238,16 +272,20 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     }
 
     /// Tries one more contact at the places where it gains more than this.
-    fn start_above(&mut self, least_gain: T, completes: bool) -> Wants<T, K, D> {
+    fn start_above(&mut self, least_gain: T, completes: bool, readings: T) -> Wants<T, K, D> {
         self.starts.iter_mut().filter(|start| start.gain <= least_gain).for_each(|start| start.gain = T::ZERO);
         (self.completes, self.tried) = (completes, None);
-        self.start(0)
+        self.start(0, readings)
     }
 
-    fn start(&mut self, number: usize) -> Wants<T, K, D> {
+    fn start(&mut self, number: usize, readings: T) -> Wants<T, K, D> {
         const { assert!(CANDIDATES <= u8::MAX as usize) };
         self.awaits = Awaits::Start(number as u8);
-        let others = if self.completes { self.best.unwrap_or(Fit::NONE) } else { self.at };
+        let mut others = if self.completes { self.best.unwrap_or(Fit::NONE) } else { self.at };
+        if is_misfit(&others, readings) {
+            // The detector was bent to explain what a contact is missing for.
+            others.scene.steps = [T::ZERO; D];
+        }
         let scene = self.starts.get(number).map_or(others.scene, |start| others.scene.with(start.spot));
         Wants::Fit(scene, self.radius_deviation(), TRYING)
     }
@@ -332,8 +370,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     }
 
     fn exchanged(&mut self, readings: T) -> Wants<T, K, D> {
-        let is_better =
-            |new: &Fit<T, K, D>| self.kept.is_none_or(|kept| score(new) < score(&kept) - T::of(PARAMETER_PRICE));
+        let is_better = |new: &Fit<T, K, D>| self.kept.is_none_or(|kept| score(new) < score(&kept) - T::of(BETTER));
         match self.best.filter(is_better) {
             Some(new) => self.kept = Some(new),
             None => (self.contact, self.more) = (self.contact + 1, self.more_before),
@@ -367,40 +404,4 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
             None => Wants::Nothing(Some(kept)),
         }
     }
-}
-
-pub(crate) fn freedom<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> T {
-    T::of(PAID) * T::of(fit.scene.count as u32)
-}
-
-/// Sum of squares of so many normal numbers beyond which they are not those of noise.
-pub(crate) fn limit<T: Real>(freedom: T) -> T {
-    let freedom = freedom.max(T::ONE);
-    freedom + T::of(MISFIT_DEVIATIONS) * (T::of(2.0) * freedom).sqrt()
-}
-
-pub(crate) fn is_misfit<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>, readings: T) -> bool {
-    fit.cost > limit(readings - freedom(fit))
-}
-
-/// What is left of the evidence: of two explanations the lower one is believed.
-fn score<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> T {
-    -fit.evidence
-}
-
-fn better<T: Real, const K: usize, const D: usize>(
-    a: Option<Fit<T, K, D>>,
-    b: Option<Fit<T, K, D>>,
-) -> Option<Fit<T, K, D>> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(if score(&b) < score(&a) { b } else { a }),
-        (a, b) => a.or(b),
-    }
-}
-
-/// The contact that the readings speak least for, if that is less than its price.
-pub(crate) fn weakest<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> Option<usize> {
-    let all = &fit.information;
-    let least = (0..fit.scene.count).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
-    (all[least] < T::of(PAID * PARAMETER_PRICE)).then_some(least)
 }

@@ -6,20 +6,20 @@
 //!
 //! All that is done in pieces, each of which ends soon, so that whoever has something else to do between them can.
 
-use crate::answer::{Answer, Contact, Flags};
+use crate::answer::{Answer, Flags};
 use crate::beside::beside;
 use crate::births::Births;
 use crate::circuit::Circuit;
-use crate::fit::{Bench, Fit, Fitting, LN_RADII, LN_SQUARES, Scene, Went, Work, Working};
-use crate::frame::{Errors, Frame, FrameError, Says};
+use crate::evidence::{freedom, is_misfit, limit, score, weakest};
+use crate::fit::{Bench, Fit, Fitting, Scene, Went, Work, Working};
+use crate::frame::{Errors, Frame, FrameError};
 use crate::held::Room;
 use crate::normal::ANY_RADIUS;
 use crate::real::Real;
 use crate::scan::{Candidates, first, no_candidates};
-use crate::search::{FIRST_GAIN, Search, Wants, freedom, is_misfit, limit, weakest};
+use crate::search::{FIRST_GAIN, Search, Wants};
 use crate::table::Table;
 use crate::unknown::{Detector, Layout, Unknown};
-use crate::vector::{Matrix, PARAMETERS};
 
 /// Most contacts that a board looks for.
 pub const BOARD_CONTACTS: usize = 3;
@@ -28,15 +28,8 @@ const WORSE: f32 = 1.3;
 /// Steps at most where contacts are followed, and where one that is gone is left out.
 const FOLLOWING: u8 = 4;
 const LEAVING_OUT: u8 = 20;
-/// Conductance (sheet conductances) above which more would change nothing.
-const SATURATED_SHEETS: f32 = 100.0;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
 const PATIENCE: [u32; 2] = [1, 64];
-
-/// Standard errors have to be above this times those by noise alone for a calibration to be worth it: the host's.
-const CALIBRATION_WORTH: f32 = 2.0;
-/// What a fit may have left to gain (squared deviations), ten times what a step is not taken for.
-const UNFINISHED: f32 = 1.0;
 
 /// A frame to be explained.
 #[derive(Clone, Copy)]
@@ -90,18 +83,18 @@ enum Piece {
 /// Finds contacts in frames, one after the other: those of one table.
 #[derive(Clone, Debug)]
 pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS, const D: usize = 0> {
-    circuit: Circuit<T, K>,
-    fitting: Fitting<T, K, D>,
-    search: Search<T, K, D>,
+    pub(crate) circuit: Circuit<T, K>,
+    pub(crate) fitting: Fitting<T, K, D>,
+    pub(crate) search: Search<T, K, D>,
     stage: Stage,
     piece: Piece,
     /// Work on this frame so far; pieces of a search.
-    work: Work<K>,
+    pub(crate) work: Work<K>,
     pieces: u32,
-    scene: Scene<T, K, D>,
-    ids: [u32; K],
+    pub(crate) scene: Scene<T, K, D>,
+    pub(crate) ids: [u32; K],
     /// Numbers begin at 1.
-    next_id: u32,
+    pub(crate) next_id: u32,
     /// What the last search left of a reading, and the frames that one that did not end well is not repeated for.
     searched: T,
     patience: u32,
@@ -110,6 +103,9 @@ pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS, const D: usize = 0> 
     was_lost: bool,
     /// Whether one is waited for that is not explained either.
     is_patient: bool,
+    /// What was followed with a contact that the readings hardly speak for, and whether that stays.
+    doubted: Option<Fit<T, K, D>>,
+    stays: bool,
 }
 
 impl<T: Real, const K: usize, const D: usize> Default for Solver<T, K, D> {
@@ -156,6 +152,8 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             wait: 0,
             was_lost: true,
             is_patient,
+            doubted: None,
+            stays: false,
         }
     }
 
@@ -240,6 +238,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         let task = Task { table, frame: &frame, errors: &errors, unknown };
         if self.stage == Stage::Idle {
             (self.stage, self.work) = (Stage::Followed, Work::NONE);
+            (self.doubted, self.stays) = (None, false);
             self.fit(self.scene, T::of(ANY_RADIUS), FOLLOWING);
         }
         let answer = (0..pieces).find_map(|_| self.go_on(task, means));
@@ -330,13 +329,22 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         task: Task<'_, T>,
         means: &mut Means<'_, '_, T>,
     ) -> Option<Answer<T, K>> {
-        match (self.stage, found.and_then(|fit| Some((fit, weakest(&fit)?)))) {
-            (Stage::Followed, Some((fit, gone))) => {
+        if self.stage != Stage::Followed {
+            return Some(self.end(found, self.stage == Stage::Kept, task));
+        }
+        // One that the readings hardly speak for goes, unless those that stay do worse without it than it costs.
+        match (self.doubted.take(), found, found.and_then(|fit| weakest(&fit))) {
+            (Some(all), Some(fewer), _) if score(&all) < score(&fewer) => {
+                self.stays = true;
+                self.fit(all.scene, T::of(ANY_RADIUS), 0);
+                None
+            }
+            (_, Some(fit), Some(gone)) if !self.stays => {
+                self.doubted = Some(fit);
                 self.fit(fit.scene.without(gone), T::of(ANY_RADIUS), LEAVING_OUT);
                 None
             }
-            (Stage::Followed, None) => self.followed(found, task, means),
-            (stage, _) => Some(self.end(found, stage == Stage::Kept, task)),
+            _ => self.followed(found, task, means),
         }
     }
 
@@ -412,94 +420,6 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         answer.flags.raise(Flags::MISFIT, is_lost || is_searched && self.pieces >= Self::MOST_PIECES);
         answer
     }
-
-    /// Gives contacts the numbers of the nearest ones before.
-    fn number(&mut self, before: &Scene<T, K, D>) {
-        let old = self.ids;
-        let (mut given, mut taken) = ([false; K], [false; K]);
-        let count = self.scene.count;
-        for _ in 0..count.min(before.count) {
-            let mut nearest = (T::infinity(), 0, 0);
-            for k in (0..count).filter(|k| !given[*k]) {
-                for l in (0..before.count).filter(|l| !taken[*l]) {
-                    let [x, y] = [0, 1].map(|d| self.scene.spots[k].at_m[d] - before.spots[l].at_m[d]);
-                    if x * x + y * y < nearest.0 {
-                        nearest = (x * x + y * y, k, l);
-                    }
-                }
-            }
-            let (_, k, l) = nearest;
-            (given[k], taken[l]) = (true, true);
-            self.ids[k] = old[l];
-        }
-        for k in (0..count).filter(|k| !given[*k]) {
-            self.ids[k] = self.next_id;
-            self.next_id = self.next_id.checked_add(1).unwrap_or(1);
-        }
-    }
-
-    fn answer(&mut self, found: Option<Fit<T, K, D>>, task: Task<'_, T>) -> Answer<T, K> {
-        let mut answer = Answer::of(self.work);
-        answer.flags.raise(Flags::SATURATED, task.errors.is_full);
-        answer.flags.raise(Flags::MORE, self.search.more);
-        let Task { table, frame, errors, unknown } = task;
-        let readings = task.readings();
-        let Some(fit) =
-            found.filter(|fit| unknown.is_some() || self.circuit.solve(&Detector::described(table), fit.scene.spots()))
-        else {
-            let voltages = (0..frame.volts.len()).filter(|i| frame.says_at(*i) == Says::Voltage);
-            let squares: T = voltages.map(|i| frame.volts[i] * frame.volts[i]).sum();
-            answer.residual = (squares / errors.variance_v2 / readings.max(T::ONE)).sqrt().min(T::max_value());
-            return answer;
-        };
-        answer.flags.raise(Flags::MISFIT, is_misfit(&fit, readings));
-        answer.flags.raise(Flags::CALIBRATE, is_to_be_calibrated(&fit, task));
-        answer.residual = (fit.cost.max(T::ZERO) / readings.max(T::ONE)).sqrt();
-        let covariance = self.fitting.normal.covariance();
-        let firmest_s = T::of(SATURATED_SHEETS) * T::of(table.head().sheet_s);
-        for k in 0..self.circuit.count {
-            let contact = self.contact(k, table, covariance.as_ref());
-            answer.flags.raise(Flags::SATURATED, contact.conductance_s > firmest_s);
-            answer.add(contact);
-        }
-        answer
-    }
-
-    fn contact(&self, k: usize, table: &Table<'_>, covariance: Option<&Matrix<T, K>>) -> Contact<T> {
-        let (loaded, radius_m) = (&self.circuit.loaded[k], T::of(table.head().radius_m));
-        let first = PARAMETERS * k;
-        let of = |i: usize, j: usize| covariance.map_or(T::infinity(), |all| all[first + i][first + j]);
-        // What the readings do not tell is known as well as where a fit may go.
-        let deviation = |i: usize, most: T| if of(i, i) >= T::ZERO { of(i, i).sqrt().min(most) } else { most };
-        let log_radius = deviation(3, T::of(LN_RADII[1] - LN_RADII[0]));
-        let [low_m, high_m] = table.bounds_m();
-        let size = [0, 1].map(|d| T::of(high_m[d] - low_m[d]) / radius_m);
-        let shift = T::of(table.head().shift_m) / radius_m;
-        let [x, y] = [0, 1].map(|i| {
-            let of_readings = deviation(i, size[i]);
-            (of_readings * of_readings + shift * shift).sqrt()
-        });
-        let of_detector = T::of(table.head().ln_conductance_error);
-        let most = T::of(LN_SQUARES[1] - LN_SQUARES[0]);
-        let variance = loaded.conductance_variance(table, radius_m, of).min(most * most) + of_detector * of_detector;
-        let conductance_s = loaded.conductance_s();
-        let apparent_conductance_s = T::ONE / (loaded.share * loaded.ohm);
-        Contact {
-            id: self.ids[k],
-            x_m: loaded.spot.at_m[0],
-            y_m: loaded.spot.at_m[1],
-            conductance_s,
-            conductance_sigma_s: conductance_s * variance.sqrt(),
-            apparent_conductance_s,
-            force_n: table.force_n(loaded.spot.at_m, apparent_conductance_s),
-            radius_m: loaded.radius_m,
-            radius_sigma_m: loaded.radius_m * log_radius,
-            sigma_m: [radius_m * x, radius_m * y],
-            correlation: Some(of(0, 1) / (x * y))
-                .filter(|r| r.is_finite())
-                .map_or(T::ZERO, |r| r.clamp(-T::ONE, T::ONE)),
-        }
-    }
 }
 
 /// Takes the places where one more contact would explain most of what those of a fit leave, on a detector that is not known.
@@ -518,14 +438,5 @@ fn births<T: Real, const K: usize, const D: usize>(
     let detector = &Detector { table: task.table, moved: Some((unknown, moved)) };
     let noise_v = fitting.on.tau * task.errors.variance_v2.sqrt();
     let (normal, kept, held) = (&fitting.normal, &fitting.on.kept, &mut parts.held);
-    Births { task, detector, circuit, normal, held, kept, noise_v }.look(starts, work);
-}
-
-/// Whether a fit leaves more than noise does, and the table takes that for an error of the detector.
-fn is_to_be_calibrated<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>, task: Task<'_, T>) -> bool {
-    let Task { table, errors, .. } = task;
-    let noise_v = T::of(table.head().noise_v);
-    let of_noise = errors.variance_v2 / (noise_v * noise_v);
-    let is_worth_it = of_noise > T::of(CALIBRATION_WORTH * CALIBRATION_WORTH);
-    is_worth_it && of_noise * (fit.cost - T::of(UNFINISHED)) > limit(task.readings() - freedom(fit))
+    Births { task, detector, circuit, normal, held, kept, noise_v, tau: fitting.on.tau }.look(starts, work);
 }

@@ -8,6 +8,7 @@
 use core::ops::Range;
 
 use crate::fields::Sample;
+use crate::lanes::at_once;
 use crate::real::Real;
 use crate::spline::{interval, weights};
 use crate::table::{MAX_ELECTRODES, Table};
@@ -125,8 +126,15 @@ impl Unknown<'_> {
 
     /// Adds what shares of the tables change at a place.
     pub(crate) fn add<T: Real>(&self, table: &Table<'_>, shares: &[f32], at_m: [T; 2], sample: &mut Sample<T>) {
+        at_once(
+            #[inline(always)]
+            || self.add_at(table, shares, &Stencil::of(table, at_m), sample),
+        );
+    }
+
+    #[inline(always)]
+    fn add_at<T: Real>(&self, table: &Table<'_>, shares: &[f32], stencil: &Stencil<T>, sample: &mut Sample<T>) {
         let count = table.electrodes() + 1;
-        let stencil = Stencil::of(table, at_m);
         for (which, node) in stencil.nodes.into_iter().enumerate() {
             let mut change = [0.0f32; MAX_ELECTRODES + 1];
             let change = &mut change[..count];
@@ -147,6 +155,7 @@ impl Unknown<'_> {
     }
 
     /// Change of the electrodes' fields at a place by a table (ohm).
+    #[inline(always)]
     pub(crate) fn fields_at<T: Real>(&self, electrodes: usize, which: usize, stencil: &Stencil<T>, ohm: &mut [T]) {
         let first = which * (electrodes + 1);
         let mut sums = [0.0f32; MAX_ELECTRODES];

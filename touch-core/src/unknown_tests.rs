@@ -1,0 +1,255 @@
+//! Detectors that are not as their table says, made up from tables of a sheet.
+
+use std::vec::Vec;
+
+use crate::circuit::{Circuit, Spot};
+use crate::frame::{Errors, Frame};
+use crate::held::{Held, Kept};
+use crate::normal::{ANY_RADIUS, Normal};
+use crate::samples::{CELLS, fields_ohm, grid_m, table};
+use crate::solver::Solver;
+use crate::table::Table;
+use crate::unknown::{Change, Detector, Direction, Layout, Moved, Unknown, pairs};
+use crate::{Answer, Room};
+
+const N: usize = 16;
+const KNOTS: usize = 12;
+/// Directions: two with fields, of which the first has a square, and one of each other kind.
+const DIRECTIONS: usize = 8;
+const TABLES: usize = 3;
+
+/// What is not known of the made-up sheet.
+struct MadeUp {
+    directions: Vec<Direction>,
+    changes: Vec<Change>,
+    fields_ohm: Vec<f32>,
+    pads_ohm: Vec<f32>,
+    distances_ohm: Vec<f32>,
+    walls: Vec<f32>,
+}
+
+impl MadeUp {
+    fn new(table: &Table<'_>) -> Self {
+        let pads_m = grid_m(4, 4);
+        let mut fields = Vec::new();
+        for j in 0..CELLS + 3 {
+            for i in 0..CELLS + 3 {
+                let head = table.head();
+                let at_m =
+                    [head.left_m + (i as f32 - 1.0) * head.step_x_m, head.bottom_m + (j as f32 - 1.0) * head.step_y_m];
+                let own = fields_ohm(&pads_m, at_m);
+                // Fields that are steeper on one side, by a share and its square; and one electrode a millimetre off.
+                let share = 0.05 + 2.0 * at_m[0];
+                fields.extend(own.iter().map(|ohm| share * ohm).chain([30.0]));
+                fields.extend(own.iter().map(|ohm| 0.5 * share * share * ohm).chain([3.0]));
+                let off = fields_ohm(&pads_m, [at_m[0] - 0.001, at_m[1]]);
+                fields.extend((0..N).map(|e| if e == 5 { off[e] - own[e] } else { 0.0 }).chain([0.0]));
+            }
+        }
+        let each =
+            |values: [f32; TABLES], count: usize| values.into_iter().flat_map(move |v| std::iter::repeat_n(v, count));
+        let changes = std::vec![
+            Change::Gain(3, 0.01),
+            Change::Offset(2, 0.002),
+            Change::Pad(7, 0.3),
+            Change::Switch(0.25),
+            Change::Bow(1, 0.01),
+            Change::Gain(8, 0.005),
+            Change::Pad(8, 0.5),
+        ];
+        let alone = |number: usize| Direction { table: None, square: None, changes: number..number + 1 };
+        let mut directions = std::vec![
+            Direction { table: Some(0), square: Some(1), changes: 0..0 },
+            Direction { table: Some(2), square: None, changes: 0..0 },
+        ];
+        directions.extend((0..5).map(alone));
+        directions.push(Direction { table: None, square: None, changes: 5..7 });
+        Self {
+            directions,
+            changes,
+            fields_ohm: fields,
+            pads_ohm: each([5.0, 1.0, 0.3], pairs(N)).collect(),
+            distances_ohm: each([8.0, 1.0, 0.0], KNOTS).collect(),
+            walls: each([2e-6, 1e-7, 0.0], pairs(N + 1)).collect(),
+        }
+    }
+
+    fn unknown(&self) -> Unknown<'_> {
+        Unknown {
+            directions: &self.directions,
+            changes: &self.changes,
+            tables: TABLES,
+            fields_ohm: &self.fields_ohm,
+            pads_ohm: &self.pads_ohm,
+            distances_ohm: &self.distances_ohm,
+            walls: &self.walls,
+            ranges_v: &[[0.1, 1.9]; N],
+            own_pads_ohm: &[40.0; N],
+        }
+    }
+}
+
+/// Calls a function with the detector after some steps.
+fn on_moved<R>(
+    table: &Table<'_>,
+    made_up: &MadeUp,
+    steps: [f64; DIRECTIONS],
+    function: impl FnOnce(&Detector<'_, f64>, &Unknown<'_>) -> R,
+) -> R {
+    let unknown = made_up.unknown();
+    let layout = Layout::of(table, &unknown);
+    let (mut numbers, mut shares) = (std::vec![0.0; layout.numbers()], [0.0; TABLES]);
+    let moved: Moved<'_, f64> = layout.moved(table, &unknown, &steps, &mut numbers, &mut shares);
+    function(&Detector { table, moved: Some((&unknown, moved)) }, &unknown)
+}
+
+/// Readings of contacts on the detector after some steps (V).
+fn read_v(table: &Table<'_>, made_up: &MadeUp, steps: [f64; DIRECTIONS], spots: &[Spot<f64>]) -> Vec<f64> {
+    on_moved(table, made_up, steps, |detector, _| {
+        let mut circuit = Circuit::<f64, 3>::EMPTY;
+        assert!(circuit.solve(detector, spots));
+        let mut volts = std::vec![0.0; N * N];
+        volts.chunks_exact_mut(N).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
+        volts.iter_mut().enumerate().for_each(|(index, volts)| *volts = detector.read_v(index % N, *volts));
+        volts
+    })
+}
+
+fn spot(x_m: f64, y_m: f64, sheets: f64) -> Spot<f64> {
+    let one = crate::tests::spot(x_m as f32, y_m as f32, sheets as f32);
+    Spot { at_m: [x_m, y_m], ln_ohm: f64::from(one.ln_ohm), ln_radius: 0.0 }
+}
+
+fn scenes() -> [Vec<Spot<f64>>; 2] {
+    [std::vec![spot(0.004, -0.011, 0.6)], std::vec![spot(-0.015, 0.008, 2.0), spot(0.012, -0.004, 0.3)]]
+}
+
+/// Steps that a detector may be off by.
+const STEPS: [f64; DIRECTIONS] = [0.8, -1.1, 0.5, -0.7, 1.2, 0.4, -0.9, 0.6];
+
+/// The parts of a room that what is held needs.
+fn with_held<R>(unknown: &Unknown<'_>, table: &Table<'_>, function: impl FnOnce(&mut Held<'_, f64>) -> R) -> R {
+    let mut numbers = std::vec![0.0; Room::<f64>::numbers(table, unknown, 3)];
+    let mut room = Room { numbers: &mut numbers, shares: &mut [0.0; TABLES] };
+    function(&mut room.parts(table, unknown, 3).held)
+}
+
+/// Each column is how readings differ by a small step, at the description and far from it; but for what couples change, some per cent of those with fields.
+#[test]
+fn patterns_are_differences() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let made_up = MadeUp::new(&table);
+    for spots in scenes() {
+        for at in [[0.0; DIRECTIONS], STEPS] {
+            for direction in 0..DIRECTIONS {
+                let moved = |way: f64| {
+                    let mut steps = at;
+                    steps[direction] += way;
+                    read_v(&table, &made_up, steps, &spots)
+                };
+                let (ahead, behind) = (moved(1e-3), moved(-1e-3));
+                let expected: Vec<f64> = ahead.iter().zip(&behind).map(|(a, b)| (a - b) / 2e-3).collect();
+                let found = on_moved(&table, &made_up, at, |detector, unknown| {
+                    let mut circuit = Circuit::<f64, 3>::EMPTY;
+                    assert!(circuit.solve(detector, &spots));
+                    let (mut there_v, mut all) = (std::vec![0.0; N * N], std::vec![0.0; N * N * DIRECTIONS]);
+                    crate::patterns::Patterns::new(detector, unknown, &circuit, &mut there_v).write(&mut all);
+                    all.chunks_exact(DIRECTIONS).map(|row| row[direction]).collect::<Vec<_>>()
+                });
+                let largest = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+                let off = expected.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                let most = if direction < 2 { 0.03 } else { 0.01 };
+                assert!(off < most * largest, "{direction} at {at:?} under {spots:?}: {off} of {largest}");
+            }
+        }
+    }
+}
+
+/// The sum of squares is the least that steps of the detector leave, with theirs, in the linear theory: and no other steps leave less.
+#[test]
+fn the_sum_of_squares_is_that_of_the_posteriors_mean() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let made_up = MadeUp::new(&table);
+    let spots = &scenes()[1];
+    let read = read_v(&table, &made_up, STEPS, spots);
+    let frame = Frame::of_volts(&read);
+    let mut errors = Errors::of(&frame, &table);
+    errors.pads.fill(0.0);
+    let noise_v = errors.variance_v2.sqrt();
+    on_moved(&table, &made_up, [0.0; DIRECTIONS], |detector, unknown| {
+        with_held(unknown, &table, |held| {
+            let mut circuit = Circuit::<f64, 3>::EMPTY;
+            assert!(circuit.solve(detector, spots));
+            let kept: Kept<DIRECTIONS> = held.hold(detector, unknown, &circuit, noise_v, |_, _| true).unwrap();
+            assert_eq!(kept.count, DIRECTIONS);
+            held.set_state(&kept, &[0.0; DIRECTIONS]);
+            let mut normal = Normal::EMPTY;
+            normal.sum_up(detector, &circuit, &frame, &errors, f64::from(ANY_RADIUS), Some((held, kept.count)));
+            held.take(kept.count);
+            let mut mean = [0.0; DIRECTIONS];
+            held.posterior(&kept, &mut mean);
+            let patterns: Vec<Vec<f64>> = (0..N * N).map(|index| held.pattern(index, kept.count).to_vec()).collect();
+            let predicted = read_v(&table, &made_up, [0.0; DIRECTIONS], spots);
+            let left = |steps: &[f64; DIRECTIONS]| {
+                let of_reading = |index: usize| {
+                    let by_steps: f64 = patterns[index].iter().zip(steps).map(|(p, s)| p * s).sum();
+                    ((read[index] - predicted[index]) / noise_v - by_steps).powi(2)
+                };
+                (0..N * N).map(of_reading).sum::<f64>() + steps.iter().map(|s| s * s).sum::<f64>()
+            };
+            let least = left(&mean);
+            assert!((normal.cost - least).abs() < 1e-6 * least, "{} {least}", normal.cost);
+            for direction in 0..DIRECTIONS {
+                for way in [-0.1, 0.1] {
+                    let mut other = mean;
+                    other[direction] += way;
+                    assert!(left(&other) > least);
+                }
+            }
+        });
+    });
+}
+
+/// One that is off by a deviation or so in all directions: contacts are where they are, as well as they say, and are not without what is not known.
+#[test]
+fn contacts_are_found_with_the_detector_that_they_are_on() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let made_up = MadeUp::new(&table);
+    let unknown = made_up.unknown();
+    let mut numbers = std::vec![0.0; Room::<f64>::numbers(&table, &unknown, 3)];
+    let mut shares = [0.0; TABLES];
+    for spots in scenes() {
+        let read = read_v(&table, &made_up, STEPS, &spots);
+        let frame = Frame::of_volts(&read);
+        let mut room = Room { numbers: &mut numbers, shares: &mut shares };
+        let mut solver = Solver::<f64, 3, DIRECTIONS>::default();
+        let answer = solver.solve_unknown(&table, &unknown, &mut room, &frame).unwrap();
+        assert_eq!(answer.contacts().len(), spots.len(), "{answer:?}");
+        assert_eq!(answer.flags.bits(), 0, "{answer:?}");
+        let off = |answer: &Answer<f64, 3>| {
+            let nearest = |spot: &Spot<f64>| {
+                let off = |c: &crate::Contact<f64>| (c.x_m - spot.at_m[0]).hypot(c.y_m - spot.at_m[1]);
+                answer
+                    .contacts()
+                    .iter()
+                    .map(|c| (off(c), c.sigma_m[0].max(c.sigma_m[1])))
+                    .min_by(|a, b| a.0.total_cmp(&b.0))
+            };
+            spots
+                .iter()
+                .map(|spot| nearest(spot).unwrap())
+                .fold((0.0f64, 0.0f64), |most, one| (most.0.max(one.0), most.1.max(one.1)))
+        };
+        let (off_m, sigma_m) = off(&answer);
+        assert!(off_m < 3.0 * sigma_m && sigma_m < 1e-3, "{off_m} {sigma_m} {answer:?}");
+        let plain = Solver::<f64, 3>::default().solve(&table, &frame).unwrap();
+        assert!(plain.contacts().len() != spots.len() || off(&plain).0 > 3.0 * off_m, "{plain:?} {off_m}");
+        // Followed, it stays, and costs less.
+        let again = solver.solve_unknown(&table, &unknown, &mut room, &frame).unwrap();
+        assert!(off(&again).0 < 3.0 * sigma_m && again.contacts().len() == spots.len());
+        assert!(again.work.frames.iter().sum::<u32>() < answer.work.frames.iter().sum::<u32>());
+    }
+}
