@@ -15,6 +15,7 @@ use crate::fit::Fit;
 use crate::normal::{ANY_RADIUS, Normal};
 use crate::real::Real;
 use crate::table::Table;
+use crate::vector::PARAMETERS;
 
 /// Standard deviation of the logarithm of a conductance before anything is read: nearly nothing is known.
 const CONDUCTANCE_DEVIATION: f32 = 4.0;
@@ -24,10 +25,25 @@ const FEWER_NATS: f32 = 5.0;
 /// What one more contact has to gain, in the linear theory, for it to be tried, and what readings have to say for one that is followed (squared deviations): seven for
 /// each number that they determine.
 pub(crate) const MORE_GAIN: f32 = 7.0 * PAID;
+/// What readings say for one that is none (squared deviations).
+const NOTHING: f32 = 2.0;
 /// Numbers of a contact that readings determine: a radius that they do not tell says nothing.
 const PAID: f32 = 3.0;
 /// Standard deviations of the sum of squares beyond which readings do not fit: the host's.
 const MISFIT_DEVIATIONS: f32 = 5.0;
+
+/// Sides of the detector, in usual radii.
+fn sides<T: Real>(table: &Table<'_>) -> [T; 2] {
+    let [low_m, high_m] = table.bounds_m();
+    [0, 1].map(|d| T::of((high_m[d] - low_m[d]) / table.head().radius_m))
+}
+
+/// What is known of a contact's parameters before anything is read, but for its radius: one over their variances.
+pub(crate) fn known<T: Real>(table: &Table<'_>) -> [T; PARAMETERS] {
+    // Of a place that is even over a side the variance is its square over 12.
+    let [x, y] = sides(table).map(|side: T| T::of(12.0) / (side * side));
+    [x, y, T::ONE / (T::of(CONDUCTANCE_DEVIATION) * T::of(CONDUCTANCE_DEVIATION)), T::ZERO]
+}
 
 /// Logarithm of the evidence for contacts but for the sum of squares: of the share of what could be before that the readings leave (nats).
 pub(crate) fn ln_volume<T: Real, const K: usize>(
@@ -35,13 +51,9 @@ pub(crate) fn ln_volume<T: Real, const K: usize>(
     circuit: &Circuit<T, K>,
     normal: &Normal<T, K>,
 ) -> T {
-    let [low_m, high_m] = table.bounds_m();
-    let sides = [0, 1].map(|d| T::of((high_m[d] - low_m[d]) / table.head().radius_m));
+    let sides: [T; 2] = sides(table);
     let strength = T::of(CONDUCTANCE_DEVIATION);
-    // Of a place that is even over a side the variance is its square over 12.
-    let [x, y] = sides.map(|side| T::of(12.0) / (side * side));
-    let known = [x, y, T::ONE / (strength * strength), T::ZERO];
-    let Some(ln_determinant) = normal.ln_determinant(known) else { return -T::max_value().sqrt() };
+    let Some(ln_determinant) = normal.ln_determinant(known(table)) else { return -T::max_value().sqrt() };
     // Four times half of ln(2 pi), of which the peaks of two normal densities take two.
     let peaks = T::of(core::f64::consts::TAU).ln() - (strength * T::of(ANY_RADIUS)).ln();
     let of_one = peaks - (sides[0] * sides[1]).ln() - T::of(FEWER_NATS);
@@ -83,4 +95,9 @@ pub(crate) fn weakest<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D
     let all = &fit.information;
     let least = (0..fit.scene.count).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
     (all[least] < T::of(MORE_GAIN)).then_some(least)
+}
+
+/// Whether the readings do not even tell how strong one contact is to a factor of two: it is none.
+pub(crate) fn is_nothing<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> bool {
+    fit.information.iter().take(fit.scene.count).any(|said| *said < T::of(NOTHING))
 }

@@ -1,7 +1,7 @@
 //! Damped Gauss-Newton steps of contacts to the readings of a frame, one look at them at a time.
 
 use crate::circuit::{Circuit, Spot};
-use crate::evidence::ln_volume;
+use crate::evidence::{known, ln_volume};
 use crate::held::Room;
 use crate::normal::Normal;
 use crate::real::Real;
@@ -156,6 +156,9 @@ pub(crate) struct Fit<T, const K: usize, const D: usize> {
     pub evidence: T,
     /// What the readings say for each contact (squared deviations).
     pub information: [T; K],
+    /// Squares that contacts would leave if the detector were as its table says, and by how much less the readings say for a contact's strength than they would then.
+    pub if_known: T,
+    pub less_said: T,
     /// Standard deviation of the logarithms of radii that they were fitted with.
     pub radius_deviation: T,
     /// Whether it is known that one more contact beside these would not be worth its price.
@@ -169,6 +172,8 @@ impl<T: Real, const K: usize, const D: usize> Fit<T, K, D> {
         cost: T::ZERO,
         evidence: T::ZERO,
         information: [T::ZERO; K],
+        if_known: T::ZERO,
+        less_said: T::ONE,
         radius_deviation: T::ZERO,
         is_alone: false,
     };
@@ -287,9 +292,9 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             scene: self.scene,
             cost: self.normal.cost,
             evidence: T::of(2.0) * ln_volume(task.table, circuit, &self.normal) - self.normal.objective(),
-            information: self.normal.information(),
+            information: self.normal.information(known(task.table)),
             radius_deviation: self.radius_deviation,
-            is_alone: false,
+            ..Fit::NONE
         }
     }
 }

@@ -30,11 +30,20 @@ pub(crate) struct Normal<T, const K: usize> {
     pub known: T,
     /// Diagonal of `J' W J` for each contact's strength by the readings that can speak for one: of a bound from above that it comes up to none does.
     said: [T; K],
+    /// What contacts would leave in the linear theory if the detector were as its table says.
+    pub if_known: T,
 }
 
 impl<T: Real, const K: usize> Normal<T, K> {
-    pub const EMPTY: Self =
-        Self { count: 0, matrix: Matrix::ZERO, pull: Vector::ZERO, cost: T::ZERO, known: T::ZERO, said: [T::ZERO; K] };
+    pub const EMPTY: Self = Self {
+        count: 0,
+        matrix: Matrix::ZERO,
+        pull: Vector::ZERO,
+        cost: T::ZERO,
+        known: T::ZERO,
+        said: [T::ZERO; K],
+        if_known: T::ZERO,
+    };
 
     /// What contacts leave of a frame.
     ///
@@ -101,6 +110,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
         }
         self.weigh(T::ONE / errors.variance_v2);
         if let Some((held, count)) = held {
+            self.if_known = self.least(radius_deviation);
             self.leave_out(held, count, T::ONE / noise_v);
         }
         self.add_known(circuit, radius_deviation);
@@ -117,6 +127,17 @@ impl<T: Real, const K: usize> Normal<T, K> {
             for j in 0..=i {
                 self.matrix[i][j] -= dot(column, &columns[j * count..(j + 1) * count]);
             }
+        }
+    }
+
+    /// The least sum of squares in the linear theory.
+    fn least(&self, radius_deviation: T) -> T {
+        let mut all = *self;
+        let weight = T::ONE / (radius_deviation * radius_deviation);
+        (0..self.count).skip(PARAMETERS - 1).step_by(PARAMETERS).for_each(|i| all.matrix[i][i] += weight);
+        match Factor::of(&all, T::of(1e-6)) {
+            Some(factor) => self.cost - factor.square(self.pull),
+            None => self.cost,
         }
     }
 
@@ -146,10 +167,15 @@ impl<T: Real, const K: usize> Normal<T, K> {
 
     /// Logarithm of the determinant of the normal matrix with a prior of these weights of a contact's parameters; `None` where they are not determined.
     pub fn ln_determinant(&self, weights: [T; PARAMETERS]) -> Option<T> {
+        let factor = Factor::of(&self.with(weights), T::ZERO)?;
+        Some(T::of(2.0) * (0..self.count).map(|i| (factor.rows[i][i] / factor.scale[i]).ln()).sum::<T>())
+    }
+
+    /// With what was known of each contact's parameters before.
+    fn with(&self, weights: [T; PARAMETERS]) -> Self {
         let mut all = *self;
         (0..self.count).for_each(|i| all.matrix[i][i] += weights[i % PARAMETERS]);
-        let factor = Factor::of(&all, T::ZERO)?;
-        Some(T::of(2.0) * (0..self.count).map(|i| (factor.rows[i][i] / factor.scale[i]).ln()).sum::<T>())
+        all
     }
 
     /// The step to the least sum of squares, damped, and by how much that falls in the linear theory; `None` where nothing is determined.
@@ -161,9 +187,9 @@ impl<T: Real, const K: usize> Normal<T, K> {
     }
 
     /// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that
-    /// of the derivative by its logarithm, or what others leave of that.
-    pub fn information(&self) -> [T; K] {
-        let covariance = self.covariance();
+    /// of the derivative by its logarithm, or what others leave of that. Places that they do not tell are known as these weights say.
+    pub fn information(&self, weights: [T; PARAMETERS]) -> [T; K] {
+        let covariance = self.covariance(weights);
         core::array::from_fn(|k| {
             let strength = PARAMETERS * k + STRENGTH;
             let left = covariance.as_ref().map_or(T::infinity(), |all| T::ONE / all[strength][strength]);
@@ -171,9 +197,15 @@ impl<T: Real, const K: usize> Normal<T, K> {
         })
     }
 
-    /// Covariance of the parameters; `None` where they are not determined.
-    pub fn covariance(&self) -> Option<Matrix<T, K>> {
-        let factor = Factor::of(self, T::of(1e-6))?;
+    /// By how much less the readings say for a contact's strength than they would on a detector that is known, at most.
+    pub fn less_said(&self) -> T {
+        let of_one = |k: usize| self.said[k] / self.matrix[PARAMETERS * k + STRENGTH][PARAMETERS * k + STRENGTH];
+        (0..self.count / PARAMETERS).map(of_one).fold(T::ONE, T::max)
+    }
+
+    /// Covariance of the parameters, with a prior of these weights of a contact's; `None` where they are not determined.
+    pub fn covariance(&self, weights: [T; PARAMETERS]) -> Option<Matrix<T, K>> {
+        let factor = Factor::of(&self.with(weights), T::of(1e-6))?;
         let mut all = Matrix::<T, K>::ZERO;
         for (i, column) in all.iter_mut().enumerate().take(self.count) {
             let mut unit = Vector::<T, K>::ZERO;

@@ -5,7 +5,7 @@
 //! detector would be bent until it explained it.
 
 use crate::circuit::Circuit;
-use crate::evidence::ln_volume;
+use crate::evidence::{known, ln_volume};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
 use crate::frame::{Errors, left_v};
 use crate::held::{Held, Kept, Parts, Room};
@@ -239,9 +239,11 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             scene: self.scene,
             cost: self.on.left + steps,
             evidence: volume - self.on.left - self.on.prior,
-            information: self.normal.information(),
+            information: self.normal.information(known(table)),
+            if_known: self.normal.if_known,
+            less_said: self.normal.less_said(),
             radius_deviation: self.radius_deviation,
-            is_alone: false,
+            ..Fit::NONE
         })
     }
 }

@@ -1,7 +1,7 @@
 //! The search for what explains a frame: what is to be done next, and what becomes of what was found by that. The work itself is the [solver](crate::Solver)'s,
 //! who does it piece by piece.
 
-use crate::evidence::{MORE_GAIN, better, is_misfit, limit, score, weakest};
+use crate::evidence::{MORE_GAIN, better, is_misfit, is_nothing, limit, score, weakest};
 use crate::fit::{Fit, Scene, TRYING};
 use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
 use crate::real::Real;
@@ -168,7 +168,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
             }
             Awaits::Best => self.added(found, readings),
             Awaits::Pruned => match (self.best, found) {
-                (Some(best), Some(fewer)) if score(&fewer) < score(&best) => {
+                (Some(best), Some(fewer)) if score(&fewer) < score(&best) || is_nothing(&best) => {
                     self.best = found;
                     self.prune(readings)
                 }
@@ -204,10 +204,8 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                 self.grown(readings)
             }
             Awaits::More => self.start_above(T::of(MORE_GAIN), false, readings),
-            Awaits::First if gain < T::of(FIRST_GAIN) => {
-                self.best = self.kept;
-                self.prune(readings)
-            }
+            // What was followed is no longer there.
+            Awaits::First if gain < T::of(FIRST_GAIN) => self.nothing_found(),
             Awaits::First => {
                 (self.at, self.best) = (Fit::NONE, None);
                 self.start_above(T::ZERO, false, readings)

@@ -10,7 +10,7 @@ use crate::answer::{Answer, Flags};
 use crate::beside::beside;
 use crate::births::Births;
 use crate::circuit::Circuit;
-use crate::evidence::{freedom, is_misfit, limit, score, weakest};
+use crate::evidence::{freedom, is_misfit, is_nothing, limit, score, weakest};
 use crate::fit::{Bench, Fit, Fitting, Scene, Went, Work, Working};
 use crate::frame::{Errors, Frame, FrameError};
 use crate::held::Room;
@@ -334,12 +334,12 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         }
         // One that the readings hardly speak for goes, unless those that stay do worse without it than it costs.
         match (self.doubted.take(), found, found.and_then(|fit| weakest(&fit))) {
-            (Some(all), Some(fewer), _) if score(&all) < score(&fewer) => {
+            (Some(all), Some(fewer), _) if score(&all) < score(&fewer) && !is_nothing(&all) => {
                 self.stays = true;
                 self.fit(all.scene, T::of(ANY_RADIUS), 0);
                 None
             }
-            (_, Some(fit), Some(gone)) if !self.stays => {
+            (_, Some(fit), Some(gone)) if !self.stays || is_nothing(&fit) => {
                 self.doubted = Some(fit);
                 self.fit(fit.scene.without(gone), T::of(ANY_RADIUS), LEAVING_OUT);
                 None

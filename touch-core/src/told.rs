@@ -1,7 +1,7 @@
 //! What is told of contacts: their numbers, and an answer.
 
 use crate::answer::{Answer, Contact, Flags};
-use crate::evidence::{freedom, is_misfit, limit};
+use crate::evidence::{freedom, is_misfit, known, limit};
 use crate::fit::{Fit, LN_RADII, LN_SQUARES, Scene};
 use crate::frame::Says;
 use crate::real::Real;
@@ -60,7 +60,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         answer.flags.raise(Flags::MISFIT, is_misfit(&fit, readings));
         answer.flags.raise(Flags::CALIBRATE, is_to_be_calibrated(&fit, task));
         answer.residual = (fit.cost.max(T::ZERO) / readings.max(T::ONE)).sqrt();
-        let covariance = self.fitting.normal.covariance();
+        let covariance = self.fitting.normal.covariance(known(table));
         let firmest_s = T::of(SATURATED_SHEETS) * T::of(table.head().sheet_s);
         for k in 0..self.circuit.count {
             let contact = self.contact(k, table, covariance.as_ref());
@@ -107,11 +107,15 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     }
 }
 
-/// Whether a fit leaves more than noise does, and the table takes that for an error of the detector.
+/// Whether a fit leaves more than noise does, and the table takes that for an error of the detector; or the detector is bent by more than noise is, and contacts would be
+/// known far better if it were known.
 fn is_to_be_calibrated<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>, task: Task<'_, T>) -> bool {
-    let Task { table, errors, .. } = task;
+    let Task { table, errors, unknown, .. } = task;
+    let worth = T::of(CALIBRATION_WORTH * CALIBRATION_WORTH);
+    if unknown.is_some() {
+        return fit.less_said > worth && fit.if_known > limit(task.readings() - freedom(fit));
+    }
     let noise_v = T::of(table.head().noise_v);
     let of_noise = errors.variance_v2 / (noise_v * noise_v);
-    let is_worth_it = of_noise > T::of(CALIBRATION_WORTH * CALIBRATION_WORTH);
-    is_worth_it && of_noise * (fit.cost - T::of(UNFINISHED)) > limit(task.readings() - freedom(fit))
+    of_noise > worth && of_noise * (fit.cost - T::of(UNFINISHED)) > limit(task.readings() - freedom(fit))
 }

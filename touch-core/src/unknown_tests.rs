@@ -228,7 +228,7 @@ fn contacts_are_found_with_the_detector_that_they_are_on() {
         let mut solver = Solver::<f64, 3, DIRECTIONS>::default();
         let answer = solver.solve_unknown(&table, &unknown, &mut room, &frame).unwrap();
         assert_eq!(answer.contacts().len(), spots.len(), "{answer:?}");
-        assert_eq!(answer.flags.bits(), 0, "{answer:?}");
+        assert_eq!(answer.flags.bits(), crate::Flags::CALIBRATE.bits(), "{answer:?}");
         let off = |answer: &Answer<f64, 3>| {
             let nearest = |spot: &Spot<f64>| {
                 let off = |c: &crate::Contact<f64>| (c.x_m - spot.at_m[0]).hypot(c.y_m - spot.at_m[1]);

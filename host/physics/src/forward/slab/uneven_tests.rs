@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::detector::{Layer, Unevenness};
+use crate::forward::DiscFields;
 use crate::forward::shell::Shell;
 
 /// A detector whose conductivity differs by a few cosines, a tenth each.
@@ -78,4 +79,22 @@ fn an_uneven_slab_is_reciprocal_and_its_images_are_its_discs() {
     let image = slab.image_impedance_ohm(&mesh.image_with([(node, 1e-4)])).unwrap();
     let disc = slab.impedance_ohm(&[Contact::flat(x_m, y_m, radius_m, 1e-4)]).unwrap();
     assert!((&image - &disc).amax() < 2e-3 * disc.amax(), "{}", (&image - &disc).amax() / disc.amax());
+}
+
+/// On even and uneven slabs, in the middle and where walls cut them.
+#[test]
+fn fields_of_a_disc_are_those_that_light_contacts_tell() {
+    for detector in [Detector::default(), uneven(0.005)] {
+        let slab = Slab::new(&detector).unwrap();
+        for (place_m, radius_m) in [([0.004, -0.011], 0.0015), ([0.0117, 0.0161], 0.0055), ([-0.0295, 0.0], 0.003)] {
+            let (found, told) =
+                (slab.disc_fields(place_m, radius_m).unwrap(), DiscFields::of_light(&slab, place_m, radius_m).unwrap());
+            let largest = told.electrodes_ohm.iter().fold(0.0f64, |most, ohm| most.max(ohm.abs()));
+            for (a, b) in found.electrodes_ohm.iter().zip(&told.electrodes_ohm) {
+                assert!((a - b).abs() < 1e-3 * largest, "{place_m:?}: {found:?} {told:?}");
+            }
+            assert!((found.own_ohm / told.own_ohm - 1.0).abs() < 2e-3, "{place_m:?}: {found:?} {told:?}");
+            assert!((found.share - told.share).abs() < 1e-3, "{place_m:?}: {found:?} {told:?}");
+        }
+    }
 }
