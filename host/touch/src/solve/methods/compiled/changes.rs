@@ -101,11 +101,6 @@ impl Changes {
         }
     }
 
-    /// How many directions there are.
-    pub fn directions(&self) -> usize {
-        self.directions.len()
-    }
-
     /// A direction for each independent step of parameters; one of several with fields has a table of its own.
     fn write_directions(
         &mut self,

@@ -1,6 +1,6 @@
 //! `core`: the contacts that a board finds by itself, from a table that the detector was compiled to.
 //!
-//! On a computer it works in [`Number`]s, and finds up to [`MOST_CONTACTS`].
+//! On a computer it works in `f64`, and finds up to [`MOST_CONTACTS`].
 
 mod between;
 mod changes;
@@ -14,7 +14,7 @@ mod unknown;
 use std::sync::Arc;
 
 use tactomo_touch_core::{
-    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Real, Room, Says as CoreSays, Solver as Core, Table,
+    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Room, Says as CoreSays, Solver as Core, Table,
 };
 
 use self::changes::Changes;
@@ -31,8 +31,6 @@ use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::threads;
 
-/// What it works in.
-type Number = f64;
 /// Most contacts that it looks for.
 const MOST_CONTACTS: usize = 8;
 /// Most directions in which a detector may differ.
@@ -43,10 +41,10 @@ pub struct Compiled {
     bytes: Arc<[u8]>,
     electrodes: usize,
     drive_v: f64,
-    core: Box<Core<Number, MOST_CONTACTS, MOST_DIRECTIONS>>,
+    core: Box<Core<f64, MOST_CONTACTS, MOST_DIRECTIONS>>,
     changes: Option<Changes>,
     /// Where the core works on them.
-    numbers: Vec<Number>,
+    numbers: Vec<f64>,
     shares: Vec<f32>,
 }
 
@@ -66,20 +64,25 @@ impl Compiled {
         let table = Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
         let (electrodes, drive_v) = (detector.electrodes.len(), detector.drive_v);
         let changes = Changes::of(problem, threads::cores()).map_err(wrong)?;
-        let changes = changes.filter(|changes| changes.directions() <= MOST_DIRECTIONS);
         let (mut numbers, mut shares) = (Vec::new(), Vec::new());
         if let Some(changes) = &changes {
             let unknown = changes.unknown();
-            numbers = vec![0.0; Room::<Number>::numbers(&table, &unknown, MOST_CONTACTS)];
+            if unknown.directions.len() > MOST_DIRECTIONS {
+                let count = unknown.directions.len();
+                return Err(refused(format!(
+                    "it may differ in {count} directions; `core` takes {MOST_DIRECTIONS} at most"
+                )));
+            }
+            numbers = vec![0.0; Room::<f64>::numbers(&table, &unknown, MOST_CONTACTS)];
             shares = vec![0.0; unknown.tables];
         }
         Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Box::default(), changes, numbers, shares })
     }
 
     /// A reading as a board can give it (V): none is far beyond its drive.
-    fn held(&self, volts: f64) -> Number {
+    fn held(&self, volts: f64) -> f64 {
         let most_v = 2.0 * self.drive_v;
-        Number::of(if volts.is_finite() { volts.clamp(-most_v, most_v) } else { volts })
+        if volts.is_finite() { volts.clamp(-most_v, most_v) } else { volts }
     }
 }
 
@@ -134,11 +137,11 @@ fn core_says(says: Says) -> CoreSays {
     }
 }
 
-fn solution(answer: &Answer<Number, MOST_CONTACTS>) -> Solution {
+fn solution(answer: &Answer<f64, MOST_CONTACTS>) -> Solution {
     let flags = answer.flags;
     Solution {
         contacts: answer.contacts().iter().map(found).collect(),
-        residual: Some(f64::from(answer.residual)),
+        residual: Some(answer.residual),
         flags: Flags {
             saturated: flags.has(CoreFlags::SATURATED),
             misfit: flags.has(CoreFlags::MISFIT) || flags.has(CoreFlags::MORE),
@@ -149,20 +152,16 @@ fn solution(answer: &Answer<Number, MOST_CONTACTS>) -> Solution {
     }
 }
 
-fn found(contact: &Contact<Number>) -> FoundContact {
+fn found(contact: &Contact<f64>) -> FoundContact {
     let [x_m, y_m] = contact.sigma_m.map(f64::from);
-    let uncertainty = Uncertainty {
-        x_m,
-        y_m,
-        correlation: f64::from(contact.correlation),
-        conductance_s: f64::from(contact.conductance_sigma_s),
-    };
-    let is_known = f64::from(contact.radius_sigma_m / contact.radius_m) < policy::known_radius_deviation();
+    let uncertainty =
+        Uncertainty { x_m, y_m, correlation: contact.correlation, conductance_s: contact.conductance_sigma_s };
+    let is_known = contact.radius_sigma_m / contact.radius_m < policy::known_radius_deviation();
     FoundContact {
-        apparent_conductance_s: Some(f64::from(contact.apparent_conductance_s)),
-        radius_m: is_known.then_some(f64::from(contact.radius_m)),
+        apparent_conductance_s: Some(contact.apparent_conductance_s),
+        radius_m: is_known.then_some(contact.radius_m),
         uncertainty: Some(uncertainty).filter(|errors| errors.x_m.is_finite() && errors.y_m.is_finite()),
         id: Some(contact.id),
-        ..FoundContact::flat(f64::from(contact.x_m), f64::from(contact.y_m), f64::from(contact.conductance_s))
+        ..FoundContact::flat(contact.x_m, contact.y_m, contact.conductance_s)
     }
 }
