@@ -10,8 +10,9 @@ use nalgebra::DMatrix;
 
 use super::joined::{Joint, JointCurrents};
 use super::spots::{Spot, SpotFields};
-use super::{ContactFields, ForwardError, ForwardModel, ImageMesh};
+use super::{ContactFields, DiscFields, ForwardError, ForwardModel, ImageMesh};
 use crate::detector::Detector;
+use crate::geometry::Point;
 use crate::scene::Contact;
 use crate::space::Place;
 
@@ -105,6 +106,14 @@ impl ForwardModel for Through {
         Ok(Box::new(Self::new(self.model.on_image_of(nodes)?.into(), self.kept.clone(), self.joints.clone())))
     }
 
+    fn disc_fields(&self, place_m: Point, radius_m: f64) -> Result<DiscFields, ForwardError> {
+        if !self.joints.is_empty() {
+            return DiscFields::of_light(self, place_m, radius_m);
+        }
+        let DiscFields { electrodes_ohm, own_ohm, share } = self.model.disc_fields(place_m, radius_m)?;
+        Ok(DiscFields::centred(self.kept.iter().map(|e| electrodes_ohm[*e]).collect(), own_ohm, share))
+    }
+
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
         let spots = self.model.spots(radius_m)?;
         Some(Box::new(SpotsThrough { spots, kept: self.kept.clone(), joint_currents: self.joint_currents.clone() }))
@@ -186,6 +195,10 @@ mod tests {
         let contact = [Contact::flat(0.004, -0.007, 0.002, 1e-3)];
         let [few, many] = [&some as &dyn ForwardModel, &*all].map(|model| model.impedance_ohm(&contact).unwrap());
         assert_eq!((few.nrows(), few[(0, 2)], few[(1, 1)]), (3, many[(5, 9)], many[(0, 0)]));
+        let fields = some.disc_fields([0.004, -0.007], 0.002)?;
+        let told = DiscFields::of_light(&some, [0.004, -0.007], 0.002)?;
+        let pairs = fields.electrodes_ohm.iter().zip(&told.electrodes_ohm).chain([(&fields.own_ohm, &told.own_ohm)]);
+        assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-3 * told.own_ohm.abs()), "{fields:?} {told:?}");
         let [few, many] = [&some as &dyn ForwardModel, &*all].map(|model| model.spots(0.002).unwrap());
         let [few, many] = [few, many].map(|spots| spots.spot([0.004, -0.007, 0.0]));
         assert_eq!(few.electrodes_ohm, [5, 0, 9].map(|e| many.electrodes_ohm[e]));

@@ -151,7 +151,7 @@ const TABLE: [Row; 14] = [
     Row {
         method: Method::Core,
         name: "core",
-        explanation: "fast, and what boards without a computer run: up to eight contacts (on a board three) from a compiled table, with standard errors",
+        explanation: "for up to eight contacts in some milliseconds, as boards without a computer find three of them: from a compiled table, with standard errors",
         family: Family::Contacts,
         parameter: None,
         build: |problem, _| Ok(Box::new(Compiled::new(problem)?)),
