@@ -47,6 +47,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
     pub fn look(&mut self, best: &mut Candidates<T>, work: &mut Working<'_, K>) {
         let Some(factor) = Factor::of(self.normal, T::of(DAMPING)) else { return };
         self.held.whiten(self.kept.count);
+        self.held.note_there(self.detector, self.circuit);
         let table = self.task.table;
         let mut change = [T::ZERO; MAX_ELECTRODES * MAX_ELECTRODES];
         let change = &mut change[..table.electrodes() * table.electrodes()];
@@ -94,13 +95,11 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
         let own_ohm = table.rough(i, j, &mut fields_ohm);
         self.circuit.potentials_ohm(self.detector, table.middle_m(i, j), &fields_ohm, &mut potentials_ohm);
         let drive_v = T::of(table.head().drive_v);
-        let mut volts = [T::ZERO; MAX_ELECTRODES];
-        for (g, row) in change.chunks_exact_mut(n).enumerate() {
-            self.circuit.row_v(self.detector, g, &mut volts);
+        for ((g, row), there_v) in change.chunks_exact_mut(n).enumerate().zip(self.held.there_v().chunks_exact(n)) {
             let own = potentials_ohm[g];
             let per_ohm = drive_v * own / (self.circuit.loads_ohm[g] * self.noise_v);
             for (e, value) in row.iter_mut().enumerate() {
-                *value = per_ohm * (potentials_ohm[e] - (T::ONE - volts[e] / drive_v) * own);
+                *value = per_ohm * (potentials_ohm[e] - (T::ONE - there_v[e] / drive_v) * own);
             }
         }
         own_ohm

@@ -28,47 +28,68 @@ impl<T: Real> Sample<T> {
     };
 }
 
+/// Coefficients about a place, with their weights.
+pub(crate) struct Stencil<T> {
+    /// Number of the coefficient.
+    pub nodes: [usize; 16],
+    /// Weight in the value; in the derivatives by x and y (1/m); in the second ones by x twice, both, y twice (1/m2).
+    pub weights: [[T; 16]; 6],
+}
+
+impl<T: Real> Stencil<T> {
+    /// At a place (m).
+    pub fn of(table: &Table<'_>, [x_m, y_m]: [T; 2]) -> Self {
+        let ([i, j], [x, y]) = table.cell(x_m, y_m);
+        let (along_x, along_y) = (weights(x), weights(y));
+        let [per_x, per_y] = [table.head.step_x_m, table.head.step_y_m].map(|step_m| T::ONE / T::of(step_m));
+        let mut stencil = Self { nodes: [0; 16], weights: [[T::ZERO; 16]; 6] };
+        for node in 0..16 {
+            let (row, column) = (node / 4, node % 4);
+            stencil.nodes[node] = (j + row) * table.sides[0] + i + column;
+            let all = [
+                along_x.value[column] * along_y.value[row],
+                along_x.slope[column] * along_y.value[row] * per_x,
+                along_x.value[column] * along_y.slope[row] * per_y,
+                along_x.bend[column] * along_y.value[row] * per_x * per_x,
+                along_x.slope[column] * along_y.slope[row] * per_x * per_y,
+                along_x.value[column] * along_y.bend[row] * per_y * per_y,
+            ];
+            stencil.weights.iter_mut().zip(all).for_each(|(weights, weight)| weights[node] = weight);
+        }
+        stencil
+    }
+}
+
 impl<'a> Table<'a> {
     /// All codes of a coefficient.
-    fn coefficient(&self, i: usize, j: usize) -> &'a [[u8; 2]] {
+    fn coefficient(&self, node: usize) -> &'a [[u8; 2]] {
         let count = RADII * (self.electrodes + OTHERS);
-        let start = 2 * (j * self.sides[0] + i) * count;
+        let start = 2 * node * count;
         self.coefficients.get(start..start + 2 * count).map_or(&[], |bytes| bytes.as_chunks().0)
     }
 
     /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives.
-    pub(crate) fn sample<T: Real>(&self, [x_m, y_m]: [T; 2], wide: T, sample: &mut Sample<T>) {
+    pub(crate) fn sample<T: Real>(&self, at_m: [T; 2], wide: T, sample: &mut Sample<T>) {
         let count = self.electrodes + OTHERS;
-        let ([i, j], [x, y]) = self.cell(x_m, y_m);
-        let (along_x, along_y) = (weights(x), weights(y));
-        let per_m = [T::ONE / T::of(self.head.step_x_m), T::ONE / T::of(self.head.step_y_m)];
+        let stencil = Stencil::of(self, at_m);
         *sample = Sample::NONE;
-        for row in 0..4 {
-            for column in 0..4 {
-                let value = along_x.value[column] * along_y.value[row];
-                let slope_x = along_x.slope[column] * along_y.value[row] * per_m[0];
-                let slope_y = along_x.value[column] * along_y.slope[row] * per_m[1];
-                let bend = [
-                    along_x.bend[column] * along_y.value[row] * per_m[0] * per_m[0],
-                    along_x.slope[column] * along_y.slope[row] * per_m[0] * per_m[1],
-                    along_x.value[column] * along_y.bend[row] * per_m[1] * per_m[1],
-                ];
-                let codes = self.coefficient(i + column, j + row);
-                let (small, large) = codes.split_at(count.min(codes.len()));
-                for (index, (small, large)) in small.iter().zip(large).enumerate() {
-                    let [small, large]: [T; 2] = [self.decoded(index, *small), self.decoded(count + index, *large)];
-                    let code = small + wide * (large - small);
-                    sample.value[index] += value * code;
-                    sample.slope[0][index] += slope_x * code;
-                    sample.slope[1][index] += slope_y * code;
-                    let (bends, widened) = sample.turning.split_at_mut(bend.len());
-                    for (sum, bend) in bends.iter_mut().zip(bend) {
-                        sum[index] += bend * code;
-                    }
-                    sample.wider[index] += value * (large - small);
-                    for (sum, slope) in widened.iter_mut().zip([slope_x, slope_y]) {
-                        sum[index] += slope * (large - small);
-                    }
+        for (which, node) in stencil.nodes.into_iter().enumerate() {
+            let [value, slope_x, slope_y, bend @ ..] = stencil.weights.each_ref().map(|weights| weights[which]);
+            let codes = self.coefficient(node);
+            let (small, large) = codes.split_at(count.min(codes.len()));
+            for (index, (small, large)) in small.iter().zip(large).enumerate() {
+                let [small, large]: [T; 2] = [self.decoded(index, *small), self.decoded(count + index, *large)];
+                let code = small + wide * (large - small);
+                sample.value[index] += value * code;
+                sample.slope[0][index] += slope_x * code;
+                sample.slope[1][index] += slope_y * code;
+                let (bends, widened) = sample.turning.split_at_mut(bend.len());
+                for (sum, bend) in bends.iter_mut().zip(bend) {
+                    sum[index] += bend * code;
+                }
+                sample.wider[index] += value * (large - small);
+                for (sum, slope) in widened.iter_mut().zip([slope_x, slope_y]) {
+                    sum[index] += slope * (large - small);
                 }
             }
         }
@@ -82,7 +103,7 @@ impl<'a> Table<'a> {
 
     /// Fields of the electrodes at the middle of a cell, roughly, as means of the coefficients about it; returns the own field of a disc of the usual radius there.
     pub(crate) fn rough<T: Real>(&self, i: usize, j: usize, fields_ohm: &mut [T; MAX_ELECTRODES]) -> T {
-        let corners = [(1, 1), (2, 1), (1, 2), (2, 2)].map(|(x, y)| self.coefficient(i + x, j + y));
+        let corners = [(1, 1), (2, 1), (1, 2), (2, 2)].map(|(x, y)| self.coefficient((j + y) * self.sides[0] + i + x));
         let mean = |quantity: usize| {
             let codes = corners.iter().filter_map(|codes| codes.get(quantity));
             let sum: i32 = codes.map(|code| i32::from(i16::from_le_bytes(*code))).sum();
@@ -118,7 +139,7 @@ impl<'a> Table<'a> {
         let wide = (T::of(self.head.radius_m) * T::of(self.head.radius_m) - small_m2) / (wide_m2 - small_m2);
         let mut own = [T::ZERO; OTHERS];
         for (row, column) in (0..4).flat_map(|row| (0..4).map(move |column| (row, column))) {
-            let codes = self.coefficient(i + column, j + row);
+            let codes = self.coefficient((j + row) * self.sides[0] + i + column);
             for (other, own) in own.iter_mut().enumerate() {
                 let of = |quantity: usize| codes.get(quantity).map_or(T::ZERO, |code| self.decoded(quantity, *code));
                 let quantity = self.electrodes + other;

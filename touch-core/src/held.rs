@@ -121,6 +121,7 @@ impl<T: Real> Held<'_, T> {
         noise_v: T,
         says: impl Fn(usize, T) -> bool,
     ) -> Option<Kept<D>> {
+        self.note_there(detector, circuit);
         Patterns::new(detector, unknown, circuit, self.there_v).write(self.patterns);
         let all = unknown.directions.len();
         let scale = T::ONE / noise_v;
@@ -146,6 +147,17 @@ impl<T: Real> Held<'_, T> {
         }
         self.factorise(count)?;
         Some(kept)
+    }
+
+    /// Notes what is there to be read.
+    pub fn note_there<const K: usize>(&mut self, detector: &Detector<'_, T>, circuit: &Circuit<T, K>) {
+        let rows = self.there_v.chunks_exact_mut(detector.table.electrodes());
+        rows.enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
+    }
+
+    /// What is there to be read (V).
+    pub fn there_v(&self) -> &[T] {
+        self.there_v
     }
 
     fn factorise(&mut self, count: usize) -> Option<()> {

@@ -6,7 +6,9 @@
 //! - [`spline`]: what its fields are interpolated with
 //! - `circuit`: readings of a few contacts, and their derivatives
 //! - `normal`, `fit`: least squares
-//! - `scan`, `beside`: where a first contact may be, and one more
+//! - `unknown`, `patterns`: what is not known of a detector, and what it changes; `held`, `round`: fits with it
+//! - `evidence`: which of two explanations is believed
+//! - `scan`, `beside`, `births`: where a first contact may be, and one more, on a detector that is known or not
 //! - `search`: what explains a frame that what was followed does not
 //! - [`Solver`]: contacts from frame to frame
 

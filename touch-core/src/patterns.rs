@@ -10,16 +10,11 @@
 //! which is fitted; of the couples, and of how current crowds, the change is left out.
 
 use crate::circuit::Circuit;
+use crate::fields::Stencil;
 use crate::lanes::at_once;
 use crate::real::Real;
 use crate::table::MAX_ELECTRODES;
-use crate::unknown::{Change, Detector, Knots, Stencil, Unknown, of_pair, pairs};
-
-/// What two contacts' fields at each other change by with a table needs of them.
-struct Pair<T> {
-    contacts: [usize; 2],
-    knots: Knots<T>,
-}
+use crate::unknown::{Change, Detector, Knots, Unknown, of_pair, pairs};
 
 /// The readings of contacts, with what their changes need.
 pub(crate) struct Patterns<'a, T, const K: usize> {
@@ -32,15 +27,13 @@ pub(crate) struct Patterns<'a, T, const K: usize> {
 }
 
 impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
-    /// Of contacts that are solved on a detector; `there_v` is room for what is there to be read.
+    /// Of contacts that are solved on a detector; `there_v` is what is there to be read (V).
     pub fn new(
         detector: &'a Detector<'a, T>,
         unknown: &'a Unknown<'a>,
         circuit: &'a Circuit<T, K>,
-        there_v: &'a mut [T],
+        there_v: &'a [T],
     ) -> Self {
-        let n = detector.table.electrodes();
-        there_v.chunks_exact_mut(n).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
         let stencil = |k: usize| (k < circuit.count).then(|| Stencil::of(detector.table, circuit.loaded[k].spot.at_m));
         Self { detector, unknown, circuit, stencils: core::array::from_fn(stencil), there_v }
     }
@@ -124,9 +117,9 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         let (table, n) = (self.detector.table, self.detector.table.electrodes());
         let [one, other] = contacts.map(|k| &self.circuit.loaded[k]);
         let way_m = [0, 1].map(|d| one.spot.at_m[d] - other.spot.at_m[d]);
-        let pair = Pair { contacts, knots: Knots::of(table, (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt()) };
+        let knots = Knots::of(table, (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt());
         let distances = &self.unknown.distances_ohm[which * table.knots()..];
-        let mut ohm: T = (0..4).map(|i| pair.knots.value[i] * T::of(distances[pair.knots.first + i])).sum();
+        let mut ohm: T = (0..4).map(|i| knots.value[i] * T::of(distances[knots.first + i])).sum();
         let walls = &self.unknown.walls[which * pairs(n + 1)..(which + 1) * pairs(n + 1)];
         let [here, there] = [one, other].map(|one| &one.sample.value);
         let at = |values: &[T], index: usize| if index < n { values[index] } else { T::ONE };
@@ -142,7 +135,7 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
             }
             ohm += at(there, row) * of_here + at(here, row) * of_there;
         }
-        let [k, l] = pair.contacts;
+        let [k, l] = contacts;
         for e in 0..n {
             ohm += fields[k][e] * other.walls_ohm[e] + fields[l][e] * one.walls_ohm[e];
         }

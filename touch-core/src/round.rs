@@ -4,6 +4,7 @@
 //! posterior's mean, and goes on from as far on the way to both as the readings agree to. While much is left, as where a contact is missing, that is taken for noise: else the
 //! detector would be bent until it explained it.
 
+use crate::births::Births;
 use crate::circuit::Circuit;
 use crate::evidence::{known, ln_volume};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
@@ -11,6 +12,7 @@ use crate::frame::{Errors, left_v};
 use crate::held::{Held, Kept, Parts, Room};
 use crate::normal::Normal;
 use crate::real::Real;
+use crate::scan::Candidates;
 use crate::solver::Task;
 use crate::table::MAX_ELECTRODES;
 use crate::unknown::{Detector, Layout, Unknown};
@@ -121,6 +123,23 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         }
     }
 
+    /// Takes the places where one more contact would explain most of what those of the last fit leave among the best.
+    pub(crate) fn births(
+        &self,
+        task: Task<'_, T>,
+        unknown: &Unknown<'_>,
+        circuit: &mut Circuit<T, K>,
+        room: &mut Room<'_, T>,
+        best: &mut Candidates<T>,
+        work: &mut Working<'_, K>,
+    ) {
+        let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K) };
+        let Some((detector, circuit, held)) = on.solved(&self.scene) else { return };
+        let (tau, normal, kept) = (self.on.tau, &self.normal, &self.on.kept);
+        let noise_v = tau * task.errors.variance_v2.sqrt();
+        Births { task, detector: &detector, circuit, normal, held, kept, noise_v, tau }.look(best, work);
+    }
+
     /// Finds how much is left of the readings where the fit begins, if that is not known; `false` if the scene makes no sense.
     fn is_begun(&mut self, on: &mut On<'_, '_, T, K>) -> bool {
         if core::mem::replace(&mut self.has_looked, true) {
@@ -149,11 +168,12 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         }
         let kept = self.on.kept;
         held.set_state(&kept, &at.steps);
+        let radius_deviation = self.radius_deviation;
         let mut look = |scene: &Scene<T, K, D>, normal: &mut Normal<T, K>, held: &mut Held<'_, T>| {
             if !circuit.solve(&detector, scene.spots()) {
                 return false;
             }
-            normal.sum_up(&detector, circuit, frame, &errors, self.radius_deviation, Some((held, kept.count)));
+            normal.sum_up(&detector, circuit, frame, &errors, radius_deviation, Some((held, kept.count)));
             work.worked_out(scene.count);
             normal.objective().is_finite()
         };
@@ -170,7 +190,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             for _ in 0..TRIES {
                 let step = self.normal.step(self.damping);
                 let Some((step, gain)) = step else {
-                    self.damping *= T::of(10.0);
+                    self.is_worse();
                     continue;
                 };
                 if gain < T::of(LEAST_GAIN) {
@@ -180,10 +200,10 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
                 if look(&trial, &mut normal, held) && normal.objective() < self.normal.objective() {
                     (at, self.normal, is_taken) = (trial, normal, true);
                     held.take(kept.count);
-                    self.damping = (self.damping / T::of(10.0)).max(T::of(1e-5));
+                    self.is_better();
                     break;
                 }
-                self.damping *= T::of(10.0);
+                self.is_worse();
             }
             if !is_taken {
                 break;

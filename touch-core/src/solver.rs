@@ -1,14 +1,13 @@
 //! Contacts from frame to frame.
 //!
 //! What was found last is fitted again. Where that does not explain a frame (of a [patient](Solver::patient) solver: nor the one before), more contacts are looked
-//! for beside it, and without it. One more is believed if it lowers the sum of squares by more than its parameters' price. What leaves too much is mended: one more where that would explain much,
+//! for beside it, and without it. Of two explanations the one with the larger evidence is believed. What leaves too much is mended: one more where that would explain much,
 //! each in turn looked for anew beside the others, and one fewer where those that stay do as well.
 //!
 //! All that is done in pieces, each of which ends soon, so that whoever has something else to do between them can.
 
 use crate::answer::{Answer, Flags};
 use crate::beside::beside;
-use crate::births::Births;
 use crate::circuit::Circuit;
 use crate::evidence::{freedom, is_misfit, is_nothing, limit, score, weakest};
 use crate::fit::{Bench, Fit, Fitting, Scene, Went, Work, Working};
@@ -16,10 +15,10 @@ use crate::frame::{Errors, Frame, FrameError};
 use crate::held::Room;
 use crate::normal::ANY_RADIUS;
 use crate::real::Real;
-use crate::scan::{Candidates, first, no_candidates};
+use crate::scan::{first, no_candidates};
 use crate::search::{FIRST_GAIN, Search, Wants};
 use crate::table::Table;
-use crate::unknown::{Detector, Layout, Unknown};
+use crate::unknown::Unknown;
 
 /// Most contacts that a board looks for.
 pub const BOARD_CONTACTS: usize = 3;
@@ -239,6 +238,8 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         if self.stage == Stage::Idle {
             (self.stage, self.work) = (Stage::Followed, Work::NONE);
             (self.doubted, self.stays) = (None, false);
+            // Its noise, and which readings say something, are others.
+            self.fitting.on.is_held = false;
             self.fit(self.scene, T::of(ANY_RADIUS), FOLLOWING);
         }
         let answer = (0..pieces).find_map(|_| self.go_on(task, means));
@@ -275,7 +276,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             Piece::Beside(from) => {
                 let (fitting, starts) = (&self.fitting, &mut self.search.starts);
                 if let (Some(unknown), Some(room)) = (task.unknown, &mut bench.room) {
-                    births(task, unknown, bench.circuit, room, fitting, starts, &mut work);
+                    fitting.births(task, unknown, bench.circuit, room, starts, &mut work);
                     let wants = self.search.placed(readings);
                     return self.count_piece(task).or_else(|| self.prepare(wants, task));
                 }
@@ -420,23 +421,4 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         answer.flags.raise(Flags::MISFIT, is_lost || is_searched && self.pieces >= Self::MOST_PIECES);
         answer
     }
-}
-
-/// Takes the places where one more contact would explain most of what those of a fit leave, on a detector that is not known.
-fn births<T: Real, const K: usize, const D: usize>(
-    task: Task<'_, T>,
-    unknown: &Unknown<'_>,
-    circuit: &Circuit<T, K>,
-    room: &mut Room<'_, T>,
-    fitting: &Fitting<T, K, D>,
-    starts: &mut Candidates<T>,
-    work: &mut Working<'_, K>,
-) {
-    let mut parts = room.parts(task.table, unknown, K);
-    let layout = Layout::of(task.table, unknown);
-    let moved = layout.moved(task.table, unknown, &fitting.scene.steps, parts.moved, parts.shares);
-    let detector = &Detector { table: task.table, moved: Some((unknown, moved)) };
-    let noise_v = fitting.on.tau * task.errors.variance_v2.sqrt();
-    let (normal, kept, held) = (&fitting.normal, &fitting.on.kept, &mut parts.held);
-    Births { task, detector, circuit, normal, held, kept, noise_v, tau: fitting.on.tau }.look(starts, work);
 }

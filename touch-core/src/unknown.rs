@@ -7,7 +7,7 @@
 
 use core::ops::Range;
 
-use crate::fields::Sample;
+use crate::fields::{Sample, Stencil};
 use crate::lanes::at_once;
 use crate::real::Real;
 use crate::spline::{interval, weights};
@@ -71,38 +71,6 @@ pub(crate) const fn pairs(side: usize) -> usize {
 pub(crate) fn of_pair<T: Copy>(triangle: &[T], a: usize, b: usize) -> T {
     let (high, low) = if a < b { (b, a) } else { (a, b) };
     triangle[pairs(high) + low]
-}
-
-/// Coefficients about a place, with their weights.
-pub(crate) struct Stencil<T> {
-    /// Number of the coefficient.
-    pub nodes: [usize; 16],
-    /// Weight in the value; in the derivatives by x and y (1/m); in the second ones by x twice, both, y twice (1/m2).
-    pub weights: [[T; 16]; 6],
-}
-
-impl<T: Real> Stencil<T> {
-    /// At a place (m).
-    pub fn of(table: &Table<'_>, [x_m, y_m]: [T; 2]) -> Self {
-        let ([i, j], [x, y]) = table.cell(x_m, y_m);
-        let (along_x, along_y) = (weights(x), weights(y));
-        let [per_x, per_y] = [table.head.step_x_m, table.head.step_y_m].map(|step_m| T::ONE / T::of(step_m));
-        let mut stencil = Self { nodes: [0; 16], weights: [[T::ZERO; 16]; 6] };
-        for node in 0..16 {
-            let (row, column) = (node / 4, node % 4);
-            stencil.nodes[node] = (j + row) * table.sides[0] + i + column;
-            let all = [
-                along_x.value[column] * along_y.value[row],
-                along_x.slope[column] * along_y.value[row] * per_x,
-                along_x.value[column] * along_y.slope[row] * per_y,
-                along_x.bend[column] * along_y.value[row] * per_x * per_x,
-                along_x.slope[column] * along_y.slope[row] * per_x * per_y,
-                along_x.value[column] * along_y.bend[row] * per_y * per_y,
-            ];
-            stencil.weights.iter_mut().zip(all).for_each(|(weights, weight)| weights[node] = weight);
-        }
-        stencil
-    }
 }
 
 impl Unknown<'_> {

@@ -154,7 +154,8 @@ fn patterns_are_differences() {
                     let mut circuit = Circuit::<f64, 3>::EMPTY;
                     assert!(circuit.solve(detector, &spots));
                     let (mut there_v, mut all) = (std::vec![0.0; N * N], std::vec![0.0; N * N * DIRECTIONS]);
-                    crate::patterns::Patterns::new(detector, unknown, &circuit, &mut there_v).write(&mut all);
+                    there_v.chunks_exact_mut(N).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
+                    crate::patterns::Patterns::new(detector, unknown, &circuit, &there_v).write(&mut all);
                     all.chunks_exact(DIRECTIONS).map(|row| row[direction]).collect::<Vec<_>>()
                 });
                 let largest = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));

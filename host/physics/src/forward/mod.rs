@@ -29,7 +29,7 @@ pub use self::disc_fields::DiscFields;
 pub use self::driving::{ConnectingPoints, DrivingLayer, sheet_drops_ohm};
 pub use self::jacobian_file::JacobianFileError;
 pub use self::joined::{Joint, JointCurrents};
-pub use self::nuisance::{Nuisance, Similar, pads_ohm};
+pub use self::nuisance::{Nuisance, Similar, changed_models, pads_ohm};
 pub use self::patches::Patches;
 pub use self::slab::{DotCurrent, DotCurrents, Face, Resolution, Slab};
 use self::spots::SpotFields;

@@ -329,27 +329,40 @@ impl At<'_> {
 
 impl Changed {
     fn new(model: &Arc<dyn ForwardModel>, parameter: Parameter, deviation: f64) -> Result<Self, ForwardError> {
-        let with = |step: f64| model.of_similar(&model.detector().stepped(&[(parameter, step)]));
-        let (models, sign) = match parameter {
-            Parameter::Gain(_)
-            | Parameter::Offset(_)
-            | Parameter::OnResistance
-            | Parameter::Pads
-            | Parameter::Pad(_)
-            | Parameter::Conductivity
-            | Parameter::DrivingSheet => (Vec::new(), 1.0),
-            Parameter::Thickness | Parameter::TopOverBottom if deviation > CURVED => {
-                (vec![with(deviation)?, with(-deviation)?], 1.0)
-            }
-            Parameter::ElectrodeX(_) | Parameter::ElectrodeY(_) => match with(deviation) {
-                Ok(ahead) => (vec![ahead], 1.0),
-                // Another pad, or the wall, is in the way.
-                Err(_) => (vec![with(-deviation)?], -1.0),
-            },
-            _ => (vec![with(deviation)?], 1.0),
-        };
+        let (models, sign) = changed_models(model, parameter, deviation)?;
         Ok(Self { parameter, deviation, models, sign })
     }
+}
+
+/// Models of a detector of which one thing is changed by a deviation: two, ahead and behind, where the square counts; one, and the sign of its change; none where no model
+/// is needed.
+///
+/// # Errors
+/// [`ForwardError::Detector`] if it cannot be modelled.
+pub fn changed_models(
+    model: &Arc<dyn ForwardModel>,
+    parameter: Parameter,
+    deviation: f64,
+) -> Result<(Vec<Arc<dyn ForwardModel>>, f64), ForwardError> {
+    let with = |step: f64| model.of_similar(&model.detector().stepped(&[(parameter, step)]));
+    Ok(match parameter {
+        Parameter::Gain(_)
+        | Parameter::Offset(_)
+        | Parameter::OnResistance
+        | Parameter::Pads
+        | Parameter::Pad(_)
+        | Parameter::Conductivity
+        | Parameter::DrivingSheet => (Vec::new(), 1.0),
+        Parameter::Thickness | Parameter::TopOverBottom if deviation > CURVED => {
+            (vec![with(deviation)?, with(-deviation)?], 1.0)
+        }
+        Parameter::ElectrodeX(_) | Parameter::ElectrodeY(_) => match with(deviation) {
+            Ok(ahead) => (vec![ahead], 1.0),
+            // Another pad, or the wall, is in the way.
+            Err(_) => (vec![with(-deviation)?], -1.0),
+        },
+        _ => (vec![with(deviation)?], 1.0),
+    })
 }
 
 /// Contact resistance of the pads (ohm), with what the crowding of the current on them makes of it: a change of all contact impedances by

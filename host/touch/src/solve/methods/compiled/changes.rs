@@ -9,17 +9,14 @@ use nalgebra::DMatrix;
 
 use super::between::{Between, Paired};
 use super::splines::Splines;
-use super::table::CompileError;
+use super::table::{CompileError, Fitted};
 use crate::solve::fit::target::PAD_ERROR;
 use crate::solve::problem::Problem;
 use tactomo_physics::detector::{Detector, Parameter};
-use tactomo_physics::forward::{ForwardError, ForwardModel, pads_ohm, sheet_drops_ohm};
+use tactomo_physics::forward::{ForwardError, ForwardModel, changed_models, pads_ohm, sheet_drops_ohm};
 use tactomo_physics::scene::Contact;
 use tactomo_physics::threads;
 use tactomo_touch_core::{Change, Direction, Unknown};
-
-/// Standard deviation of a logarithm from which its square is reckoned with as well: below, it makes less than a thirtieth of the change.
-const CURVED: f64 = 0.05;
 
 /// All that is not known of a detector.
 #[derive(Debug, Default)]
@@ -55,11 +52,15 @@ struct Compiled {
 }
 
 impl Changes {
-    /// Of a problem's detector, on the splines of its table and fields between pairs; `None` if it is known exactly.
+    /// Of a problem's detector, by what its table is fitted with; `None` if it is known exactly.
     ///
     /// # Errors
     /// [`CompileError`] if a detector that is a little different cannot be modelled.
-    pub fn of(problem: &Problem, cores: usize) -> Result<Option<Self>, CompileError> {
+    pub fn of(
+        problem: &Problem,
+        Fitted { splines, paired, .. }: &Fitted,
+        cores: usize,
+    ) -> Result<Option<Self>, CompileError> {
         let detector = problem.detector();
         let directions = detector.unknowns().directions;
         let is_known =
@@ -67,15 +68,14 @@ impl Changes {
         if directions.is_empty() && is_known {
             return Ok(None);
         }
-        let (splines, (paired, _)) = (Splines::of(problem)?, Paired::of(problem)?);
         let coarse = problem.model.coarse()?.unwrap_or_else(|| Arc::clone(&problem.model));
         let (compiled, sums) = sums_of(&coarse, &directions)?;
-        let base = sampled(&*coarse, &splines, problem.usual_radius_m())?;
-        let table = |sum: &Sum| table_of(sum, (&coarse, &base), &splines, &paired, problem.usual_radius_m());
+        let base = sampled(&*coarse, splines, problem.usual_radius_m())?;
+        let table = |sum: &Sum| table_of(sum, (&coarse, &base), splines, paired, problem.usual_radius_m());
         let mut tables = threads::map_on(cores, &sums, table).into_iter().collect::<Result<Vec<_>, ForwardError>>()?;
         let sheet = directions.iter().flatten().any(|(parameter, _)| *parameter == Parameter::DrivingSheet);
         let sheet = sheet.then(|| {
-            tables.push(of_driving_sheet(detector, &paired));
+            tables.push(of_driving_sheet(detector, paired));
             tables.len() - 1
         });
         let mut all = Self::default();
@@ -212,7 +212,7 @@ fn sums_of(
     directions: &[Vec<(Parameter, f64)>],
 ) -> Result<(Vec<Compiled>, Vec<Sum>), ForwardError> {
     let mut deviations: Vec<(Parameter, f64)> = Vec::new();
-    for (parameter, step) in directions.iter().flatten().filter(|(parameter, _)| has_fields(*parameter)) {
+    for (parameter, step) in directions.iter().flatten() {
         match deviations.iter_mut().find(|(known, _)| known == parameter) {
             Some((_, square)) => *square += step * step,
             None => deviations.push((*parameter, step * step)),
@@ -221,36 +221,21 @@ fn sums_of(
     let (mut compiled, mut sums) = (Vec::new(), Vec::new());
     for (parameter, square) in deviations {
         let deviation = square.sqrt();
-        let with = |step: f64| coarse.of_similar(&coarse.detector().stepped(&[(parameter, step)]));
-        let linear = sums.len();
-        let mut second = None;
-        if parameter.is_log() && deviation > CURVED && !matches!(parameter, Parameter::Uneven(_)) {
-            let (ahead, behind) = (with(deviation)?, with(-deviation)?);
-            sums.push(vec![(0.5, Arc::clone(&ahead)), (-0.5, Arc::clone(&behind))]);
-            second = Some(sums.len());
-            sums.push(vec![(1.0, ahead), (1.0, behind), (-2.0, Arc::clone(coarse))]);
-        } else {
-            // Another pad, or the wall, may be in the way.
-            let (sign, ahead) = match with(deviation) {
-                Ok(ahead) => (1.0, ahead),
-                Err(_) => (-1.0, with(-deviation)?),
-            };
-            sums.push(vec![(sign, ahead), (-sign, Arc::clone(coarse))]);
+        let (models, sign) = changed_models(coarse, parameter, deviation)?;
+        let (linear, mut second) = (sums.len(), None);
+        match &models[..] {
+            [] => continue,
+            [ahead, behind] => {
+                let both = |a: f64, b: f64| vec![(a, Arc::clone(ahead)), (b, Arc::clone(behind))];
+                sums.push(both(0.5, -0.5));
+                second = Some(sums.len());
+                sums.push(both(1.0, 1.0).into_iter().chain([(-2.0, Arc::clone(coarse))]).collect());
+            }
+            [ahead, ..] => sums.push(vec![(sign, Arc::clone(ahead)), (-sign, Arc::clone(coarse))]),
         }
         compiled.push(Compiled { parameter, deviation, linear, square: second });
     }
     Ok((compiled, sums))
-}
-
-fn has_fields(parameter: Parameter) -> bool {
-    matches!(
-        parameter,
-        Parameter::Thickness
-            | Parameter::TopOverBottom
-            | Parameter::Uneven(_)
-            | Parameter::ElectrodeX(_)
-            | Parameter::ElectrodeY(_)
-    )
 }
 
 /// Fields of discs of the usual radius at all places of the splines.

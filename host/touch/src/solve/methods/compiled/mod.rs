@@ -19,7 +19,7 @@ use tactomo_touch_core::{
 
 use self::changes::Changes;
 pub use self::file::{CompiledTable, TableFileError};
-use self::table::compile_apart;
+use self::table::Fitted;
 pub use self::table::{CompileError, compile};
 use crate::solve::answer::{Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
 use crate::solve::fit::policy;
@@ -60,10 +60,11 @@ impl Compiled {
             CompileError::Model(error) => error,
             error => refused(with_causes(&error)),
         };
-        let bytes = compile_apart(problem).map_err(wrong)?;
+        let fitted = Fitted::of(problem).map_err(wrong)?;
+        let bytes = fitted.table_apart(problem).map_err(wrong)?;
         let table = Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
         let (electrodes, drive_v) = (detector.electrodes.len(), detector.drive_v);
-        let changes = Changes::of(problem, threads::cores()).map_err(wrong)?;
+        let changes = Changes::of(problem, &fitted, threads::cores()).map_err(wrong)?;
         let (mut numbers, mut shares) = (Vec::new(), Vec::new());
         if let Some(changes) = &changes {
             let unknown = changes.unknown();

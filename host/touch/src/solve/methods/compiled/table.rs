@@ -61,36 +61,55 @@ pub enum CompileError {
 /// # Errors
 /// [`CompileError`] if it is curved, has too many electrodes or no model.
 pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
-    compile_with(problem, Unknown::of(problem))
+    Fitted::of(problem)?.table(problem, Unknown::of(problem))
 }
 
-/// The table for who knows [what is not known](super::changes::Changes) of the detector apart from it: of its errors it has those only that no readings tell.
-pub(super) fn compile_apart(problem: &Problem) -> Result<Vec<u8>, CompileError> {
-    let directions = problem.detector().unknowns().directions;
-    let conductivity = directions.iter().flatten().filter(|(parameter, _)| *parameter == Parameter::Conductivity);
-    let square: f64 = conductivity.map(|(_, step)| step * step).sum();
-    compile_with(problem, Unknown { ln_conductance: square.sqrt(), ..Unknown::default() })
+/// What the tables of a detector are fitted with.
+pub(super) struct Fitted {
+    /// Over places.
+    pub splines: Splines,
+    /// Between places.
+    pub paired: Paired,
+    between: Between,
 }
 
-fn compile_with(problem: &Problem, unknown: Unknown) -> Result<Vec<u8>, CompileError> {
-    let detector = problem.detector();
-    let n = detector.electrodes.len();
-    if n > MAX_ELECTRODES {
-        return Err(CompileError::Electrodes { detector: detector.name.clone(), found: n });
+impl Fitted {
+    /// Of a problem's detector.
+    ///
+    /// # Errors
+    /// [`CompileError`] if it is curved, has too many electrodes or no model.
+    pub fn of(problem: &Problem) -> Result<Self, CompileError> {
+        let detector = problem.detector();
+        let found = detector.electrodes.len();
+        if found > MAX_ELECTRODES {
+            return Err(CompileError::Electrodes { detector: detector.name.clone(), found });
+        }
+        if detector.surface.is_some() {
+            return Err(CompileError::Curved { detector: detector.name.clone() });
+        }
+        let (paired, between) = Paired::of(problem)?;
+        Ok(Self { splines: Splines::of(problem)?, paired, between })
     }
-    if detector.surface.is_some() {
-        return Err(CompileError::Curved { detector: detector.name.clone() });
+
+    /// The table for who knows [what is not known](super::changes::Changes) of the detector apart from it: of its errors it has those only that no readings tell.
+    ///
+    /// # Errors
+    /// [`CompileError`] if the model has no answer.
+    pub fn table_apart(&self, problem: &Problem) -> Result<Vec<u8>, CompileError> {
+        let directions = problem.detector().unknowns().directions;
+        let conductivity = directions.iter().flatten().filter(|(parameter, _)| *parameter == Parameter::Conductivity);
+        let square: f64 = conductivity.map(|(_, step)| step * step).sum();
+        self.table(problem, Unknown { ln_conductance: square.sqrt(), ..Unknown::default() })
     }
-    let splines = Splines::of(problem)?;
-    let places_m = splines.places_m();
-    let of_place = |place_m: &[f64; 2]| {
-        let [small, wide] = DISCS.map(|radii| of_disc(problem, *place_m, radii * problem.usual_radius_m()));
-        Ok([small?, wide?].concat())
-    };
-    let values = places_m.iter().map(of_place).collect::<Result<Vec<_>, ForwardError>>()?;
-    let quantities = splines.fitted(&values);
-    let (paired, between) = Paired::of(problem)?;
-    Ok(written(problem, &splines.grid, &quantities, (&paired, &between), unknown))
+
+    fn table(&self, problem: &Problem, unknown: Unknown) -> Result<Vec<u8>, CompileError> {
+        let of_place = |place_m: &[f64; 2]| {
+            let [small, wide] = DISCS.map(|radii| of_disc(problem, *place_m, radii * problem.usual_radius_m()));
+            Ok([small?, wide?].concat())
+        };
+        let values = self.splines.places_m().iter().map(of_place).collect::<Result<Vec<_>, ForwardError>>()?;
+        Ok(written(problem, self, &self.splines.fitted(&values), unknown))
+    }
 }
 
 pub(super) fn failed(problem: &Problem, what: &'static str) -> CompileError {
@@ -109,13 +128,8 @@ fn top_s_per_m(problem: &Problem) -> f64 {
 }
 
 /// The bytes.
-fn written(
-    problem: &Problem,
-    grid: &Grid,
-    quantities: &DMatrix<f64>,
-    (paired, between): (&Paired, &Between),
-    unknown: Unknown,
-) -> Vec<u8> {
+fn written(problem: &Problem, fitted: &Fitted, quantities: &DMatrix<f64>, unknown: Unknown) -> Vec<u8> {
+    let Fitted { splines: Splines { grid, .. }, paired, between } = fitted;
     let detector = problem.detector();
     let n = detector.electrodes.len();
     let pads_ohm = problem.model.electrode_fields_ohm();
