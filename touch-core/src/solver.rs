@@ -275,7 +275,9 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             },
             Piece::Beside(from) => {
                 let (fitting, starts) = (&self.fitting, &mut self.search.starts);
-                if let (Some(unknown), Some(room)) = (task.unknown, &mut bench.room) {
+                if D > 0
+                    && let (Some(unknown), Some(room)) = (task.unknown, &mut bench.room)
+                {
                     fitting.births(task, unknown, bench.circuit, room, starts, &mut work);
                     let wants = self.search.placed(readings);
                     return self.count_piece(task).or_else(|| self.prepare(wants, task));
