@@ -5,8 +5,9 @@
 
 use crate::circuit::{Circuit, Spot};
 use crate::fit::{Working, held_ohm};
-use crate::held::{Held, Kept, dot};
+use crate::held::{Held, Kept};
 use crate::normal::{Factor, Normal};
+use crate::products::dot;
 use crate::real::Real;
 use crate::scan::{APART, Candidate, Candidates, places, take};
 use crate::solver::Task;

@@ -1,17 +1,19 @@
 //! What is not known of a detector as an error of the readings: its patterns, held while contacts move, and what they take from residuals and derivatives.
 //!
-//! With patterns `P` for a step of one deviation each and noise of variance `v`, readings that a detector at steps `s` would have are `y - h(c, s) + P s`, of covariance
-//! `v I + P P'`. By Woodbury's identity, with `p = P / sqrt(v)` and `L L' = I + p' p`,
+//! With patterns `P` for a step of one deviation each, where the detector is at steps `s` and `r` is left of readings in noise of variance `v`, other steps cost least where,
+//! with `p = P / sqrt(v)`, `U' U = I + p' p` and `g = p' r / sqrt(v) - s`,
 //!
 //! ```text
-//! r' (v I + P P')^-1 r = r' r / v - |L^-1 p' r / sqrt(v)|^2
+//! S = r' r / v + s' s - |U'^-1 g|^2
 //! ```
 //!
-//! and the posterior's mean of the steps is `L'^-1 L^-1 p' r / sqrt(v)`.
+//! at `s + U^-1 U'^-1 g`, the posterior's mean: by Woodbury's identity the sum of squares with `v I + P P'` for the covariance. What is subtracted is as small as what is left,
+//! however far the detector is from its description.
 
 use crate::circuit::Circuit;
 use crate::lanes::at_once;
 use crate::patterns::Patterns;
+use crate::products::{add, backward, dot, factorise, forward};
 use crate::real::Real;
 use crate::table::Table;
 use crate::unknown::{Detector, Layout, Unknown};
@@ -47,24 +49,25 @@ impl<T: Real> Room<'_, T> {
 
     pub(crate) fn parts(&mut self, table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> Parts<'_, T> {
         let (moved, mut rest) = self.numbers.split_at_mut(Layout::of(table, unknown).numbers());
-        let [there_v, patterns, state, factor, products, taken, columns, slopes, left] =
+        let [there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left] =
             counts(table, unknown, contacts).map(|count| {
                 let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
                 rest = after;
                 part
             });
-        let held = Held { there_v, patterns, state, factor, products, taken, columns, slopes, left };
+        let held = Held { there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left };
         Parts { moved, shares: &mut *self.shares, held }
     }
 }
 
-fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 9] {
+fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 10] {
     let (readings, count) = (table.electrodes() * table.electrodes(), unknown.directions.len());
     let parameters = PARAMETERS * contacts;
     [
         readings,
         readings * count,
-        readings,
+        count,
+        count,
         count * count,
         count,
         count,
@@ -78,19 +81,30 @@ fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 
 #[derive(Debug)]
 pub(crate) struct Held<'m, T> {
     there_v: &'m mut [T],
-    /// In noise: rows of readings, of those directions that count.
+    /// In noise: a row of readings for each direction that counts.
     patterns: &'m mut [T],
-    /// What the detector's steps are of the readings, in the linear theory.
-    state: &'m mut [T],
-    /// `L`, row by row.
+    /// `U s` and `U'^-1 s` of where the detector is.
+    scaled: &'m mut [T],
+    solved: &'m mut [T],
+    /// `U`, row by row.
     factor: &'m mut [T],
-    /// `L^-1 p' r` of the last look, and of the last that was taken; `L^-1 p' J`, a row a parameter.
+    /// `U'^-1 g` of the last look, and of the last that was taken; `U'^-1 p' J`, a row a parameter.
     products: &'m mut [T],
     taken: &'m mut [T],
     columns: &'m mut [T],
-    /// Of the last look: derivatives by the parameters (V), rows of readings, and what is left, in noise.
+    /// Of the last look: derivatives (V), a row of readings for each parameter, and what is left, in noise.
     slopes: &'m mut [T],
     left: &'m mut [T],
+}
+
+/// A look in the directions of the patterns.
+pub(crate) struct Projected<'a, T> {
+    /// `U'^-1 p' r` of what is left, and `U'^-1 p' J`: a row a parameter.
+    pub left: &'a [T],
+    pub columns: &'a [T],
+    /// `U s` and `U'^-1 s` of where the detector is.
+    pub scaled: &'a [T],
+    pub solved: &'a [T],
 }
 
 /// Which directions count.
@@ -123,29 +137,25 @@ impl<T: Real> Held<'_, T> {
     ) -> Option<Kept<D>> {
         self.note_there(detector, circuit);
         Patterns::new(detector, unknown, circuit, self.there_v).write(self.patterns);
-        let all = unknown.directions.len();
-        let scale = T::ONE / noise_v;
-        self.products.fill(T::ZERO);
-        for (index, row) in self.patterns.chunks_exact_mut(all).enumerate() {
+        let readings = self.there_v.len();
+        for (index, scale) in self.left.iter_mut().enumerate() {
             let read_v = detector.read_v(index % detector.table.electrodes(), self.there_v[index]);
-            let scale = if says(index, read_v) { scale } else { T::ZERO };
-            for (value, square) in row.iter_mut().zip(self.products.iter_mut()) {
-                *value *= scale;
-                *square += *value * *value;
-            }
+            *scale = if says(index, read_v) { T::ONE / noise_v } else { T::ZERO };
         }
         let mut kept = Kept::NONE;
-        for (direction, _) in self.products.iter().enumerate().filter(|(_, square)| **square > T::of(LEAST_SQUARE)) {
-            kept.which[kept.count] = direction as u16;
-            kept.count += 1;
-        }
-        let count = kept.count;
-        for row in 0..self.there_v.len() {
-            for (to, from) in kept.iter().enumerate() {
-                self.patterns[row * count + to] = self.patterns[row * all + from];
+        for direction in 0..unknown.directions.len() {
+            let (before, from) = self.patterns.split_at_mut(direction * readings);
+            let pattern = &mut from[..readings];
+            pattern.iter_mut().zip(&*self.left).for_each(|(value, scale)| *value *= *scale);
+            if dot(pattern, pattern) > T::of(LEAST_SQUARE) {
+                if let Some(to) = before.get_mut(kept.count * readings..(kept.count + 1) * readings) {
+                    to.copy_from_slice(pattern);
+                }
+                kept.which[kept.count] = direction as u16;
+                kept.count += 1;
             }
         }
-        self.factorise(count)?;
+        self.factorise(kept.count)?;
         Some(kept)
     }
 
@@ -162,18 +172,24 @@ impl<T: Real> Held<'_, T> {
 
     fn factorise(&mut self, count: usize) -> Option<()> {
         let Self { patterns, factor, there_v, .. } = self;
-        let rows = there_v.len();
+        let (readings, factor) = (there_v.len(), &mut factor[..count * count]);
+        let patterns = &patterns[..readings * count];
+        T::products(patterns, patterns, readings, true, |i, j, product| factor[j * count + i] = product);
+        (0..count).for_each(|i| factor[i * count + i] += T::ONE);
         at_once(
             #[inline(always)]
-            || factorise(&patterns[..rows * count], count, &mut factor[..count * count]),
+            || factorise(factor, count),
         )
     }
 
     /// Notes where the detector is.
     pub fn set_state<const D: usize>(&mut self, kept: &Kept<D>, steps: &[T; D]) {
-        for (state, row) in self.state.iter_mut().zip(self.patterns.chunks_exact(kept.count.max(1))) {
-            *state = kept.iter().zip(row).map(|(direction, pattern)| steps[direction] * *pattern).sum();
+        let count = kept.count;
+        kept.iter().zip(self.solved.iter_mut()).for_each(|(direction, to)| *to = steps[direction]);
+        for (i, row) in self.factor.chunks_exact(count.max(1)).enumerate().take(count) {
+            self.scaled[i] = dot(&row[i..], &self.solved[i..count]);
         }
+        forward(self.factor, count, self.solved);
     }
 
     /// Begins a look.
@@ -182,54 +198,54 @@ impl<T: Real> Held<'_, T> {
         self.left.fill(T::ZERO);
     }
 
-    /// Notes a reading, of which so much is left beside where the detector is, with its derivatives by the parameters (V); returns what the detector's steps are of it,
-    /// in noise.
-    pub fn add(&mut self, index: usize, noise_v: T, left_v: T, slope: &[T]) -> T {
-        let state = self.state[index];
-        self.left[index] = left_v / noise_v + state;
-        self.slopes[index * slope.len()..(index + 1) * slope.len()].copy_from_slice(slope);
-        state
+    /// Notes a reading, of which so much is left, with its derivatives by the parameters (V).
+    pub fn note(&mut self, index: usize, left: T, slope: &[T]) {
+        let rows = self.slopes.chunks_exact_mut(self.left.len());
+        rows.zip(slope).for_each(|(row, slope)| row[index] = *slope);
+        self.left[index] = left;
     }
 
-    /// The patterns of a reading, in noise.
+    /// The pattern of a direction, in noise.
     #[cfg(test)]
-    pub fn pattern(&self, index: usize, count: usize) -> &[T] {
-        &self.patterns[index * count..(index + 1) * count]
+    pub fn pattern(&self, direction: usize) -> &[T] {
+        let readings = self.there_v.len();
+        &self.patterns[direction * readings..(direction + 1) * readings]
     }
 
     /// Ends the look at contacts of so many parameters: products of what is left, and of the derivatives times `scale`, with the patterns are projected.
     pub fn project(&mut self, count: usize, parameters: usize, scale: T) {
-        let Self { patterns, slopes, left, products, columns, factor, .. } = self;
-        let rows = left.len();
+        let Self { patterns, slopes, left, products: of_left, columns, factor, .. } = self;
+        let readings = left.len();
+        let patterns = &patterns[..readings * count];
+        T::products(left, patterns, readings, false, |_, direction, product| of_left[direction] = product);
+        T::products(&slopes[..readings * parameters], patterns, readings, false, |which, direction, product| {
+            columns[which * count + direction] = scale * product;
+        });
         at_once(
             #[inline(always)]
             || {
-                let patterns = &patterns[..rows * count];
-                multiply(patterns, count, left, 1, 0, &mut products[..count]);
-                forward(factor, count, &mut products[..count]);
-                for (which, column) in columns.chunks_exact_mut(count.max(1)).enumerate().take(parameters) {
-                    multiply(patterns, count, slopes, parameters, which, column);
-                    column.iter_mut().for_each(|value| *value *= scale);
+                forward(factor, count, &mut of_left[..count]);
+                for column in columns.chunks_exact_mut(count.max(1)).take(parameters) {
                     forward(factor, count, column);
                 }
             },
         );
     }
 
-    /// `L^-1 p' r`, and `L^-1 p' J`: a row a parameter.
-    pub fn projected(&self, count: usize) -> (&[T], &[T]) {
-        (&self.products[..count], self.columns)
+    /// What the last look leaves and its derivatives are in the directions of the patterns.
+    pub fn projected(&self, count: usize) -> Projected<'_, T> {
+        let Self { products, scaled, solved, columns, .. } = self;
+        Projected { left: &products[..count], columns, scaled: &scaled[..count], solved: &solved[..count] }
     }
 
     /// Takes what the detector's posterior mean explains from what the last look left.
     pub fn whiten(&mut self, count: usize) {
-        let vector = &mut self.taken[..count];
-        vector.copy_from_slice(&self.products[..count]);
-        backward(self.factor, count, vector);
-        for (left, pattern) in self.left.iter_mut().zip(self.patterns.chunks_exact(count.max(1))) {
-            if *left != T::ZERO {
-                *left -= dot(&pattern[..count], vector);
-            }
+        self.take(count);
+        let Self { taken, patterns, left, factor, .. } = self;
+        let vector = &mut taken[..count];
+        backward(factor, count, vector);
+        for (step, pattern) in vector.iter().zip(patterns.chunks_exact(left.len())) {
+            add(left, -*step, pattern);
         }
     }
 
@@ -240,138 +256,37 @@ impl<T: Real> Held<'_, T> {
 
     /// The part of a change's square, in noise, that steps of the detector could do as well; and its products with the derivatives but for what these do too, whose
     /// volts are so much noise.
-    pub fn shared(&mut self, change: &[T], count: usize, scale: T, products: &mut [T]) -> T {
+    pub fn shared(&mut self, change: &[T], count: usize, scale: T, shared: &mut [T]) -> T {
         let vector = &mut self.taken[..count];
-        vector.fill(T::ZERO);
-        let slopes = self.slopes.chunks_exact(products.len());
-        for ((value, pattern), slope) in change.iter().zip(self.patterns.chunks_exact(count.max(1))).zip(slopes) {
-            vector.iter_mut().zip(pattern).for_each(|(sum, pattern)| *sum += *value * *pattern);
-            products.iter_mut().zip(slope).for_each(|(sum, slope)| *sum += *value * *slope);
-        }
+        let readings = change.len();
+        T::products(change, &self.patterns[..readings * count], readings, false, |_, direction, product| {
+            vector[direction] = product;
+        });
+        T::products(change, &self.slopes[..readings * shared.len()], readings, false, |_, which, product| {
+            shared[which] = scale * product;
+        });
         forward(self.factor, count, vector);
-        for (product, column) in products.iter_mut().zip(self.columns.chunks_exact(count.max(1))) {
-            *product = scale * *product - dot(&column[..count], vector);
+        for (shared, column) in shared.iter_mut().zip(self.columns.chunks_exact(count.max(1))) {
+            *shared -= dot(&column[..count], vector);
         }
         dot(vector, vector)
     }
 
     /// The last look is where contacts are.
     pub fn take(&mut self, count: usize) {
-        self.taken[..count].copy_from_slice(&self.products[..count]);
+        for ((taken, left), solved) in self.taken.iter_mut().zip(&*self.products).zip(&*self.solved).take(count) {
+            *taken = *left - *solved;
+        }
     }
 
-    /// `L'^-1` of the last products that were taken: the posterior's mean of those directions that count.
+    /// Takes those directions that count to the posterior's mean, from where the detector was noted to be.
     pub fn posterior<const D: usize>(&mut self, kept: &Kept<D>, steps: &mut [T; D]) {
         backward(self.factor, kept.count, self.taken);
-        kept.iter().zip(self.taken.iter()).for_each(|(direction, step)| steps[direction] = *step);
+        kept.iter().zip(self.taken.iter()).for_each(|(direction, step)| steps[direction] += *step);
     }
 
     /// Logarithm of the determinant of `I + p' p`.
     pub fn ln_determinant(&self, count: usize) -> T {
         T::of(2.0) * (0..count).map(|i| self.factor[i * count + i].ln()).sum::<T>()
-    }
-}
-
-/// `L` of `I + p' p`; `None` if rounding has the say.
-#[inline(always)]
-fn factorise<T: Real>(patterns: &[T], count: usize, matrix: &mut [T]) -> Option<()> {
-    gram(patterns, count, matrix);
-    (0..count).for_each(|i| matrix[i * count + i] += T::ONE);
-    for i in 0..count {
-        let (above, rest) = matrix.split_at_mut(i * count);
-        let row = &mut rest[..count];
-        for (j, other) in above.chunks_exact(count).enumerate() {
-            row[j] = (row[j] - dot(&row[..j], &other[..j])) / other[j];
-        }
-        let square = row[i] - dot(&row[..i], &row[..i]);
-        // One at least, but for rounding.
-        if !(square > T::of(0.5) && square.is_finite()) {
-            return None;
-        }
-        row[i] = square.sqrt();
-    }
-    Some(())
-}
-
-/// `p' v`, of a vector whose elements are `stride` apart from `first` on, four rows of `p` at once.
-#[inline(always)]
-fn multiply<T: Real>(rows: &[T], count: usize, vector: &[T], stride: usize, first: usize, product: &mut [T]) {
-    product.fill(T::ZERO);
-    if count == 0 {
-        return;
-    }
-    for (at, four) in rows.chunks(4 * count).enumerate() {
-        let factor = |row: usize| vector[(4 * at + row) * stride + first];
-        if four.len() == 4 * count {
-            let [fa, fb, fc, fd] = [0, 1, 2, 3].map(factor);
-            let (a, rest) = four.split_at(count);
-            let (b, rest) = rest.split_at(count);
-            let (c, d) = rest.split_at(count);
-            for ((((sum, a), b), c), d) in product.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-                *sum += fa * *a + fb * *b + fc * *c + fd * *d;
-            }
-        } else {
-            for (row, part) in four.chunks_exact(count).enumerate() {
-                let factor = factor(row);
-                product.iter_mut().zip(part).for_each(|(sum, value)| *sum += factor * *value);
-            }
-        }
-    }
-}
-
-/// `L^-1` of a vector, with `L` row by row.
-#[inline(always)]
-pub(crate) fn forward<T: Real>(factor: &[T], count: usize, vector: &mut [T]) {
-    for (i, row) in factor.chunks_exact(count.max(1)).enumerate().take(count) {
-        vector[i] = (vector[i] - dot(&row[..i], &vector[..i])) / row[i];
-    }
-}
-
-/// `L'^-1` of a vector.
-fn backward<T: Real>(factor: &[T], count: usize, vector: &mut [T]) {
-    for i in (0..count).rev() {
-        let row = &factor[i * count..(i + 1) * count];
-        let value = vector[i] / row[i];
-        vector[i] = value;
-        vector.iter_mut().zip(row).take(i).for_each(|(other, factor)| *other -= *factor * value);
-    }
-}
-
-/// Scalar product, in four sums for a processor to do at once.
-#[inline(always)]
-pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    let mut sums = [T::ZERO; 4];
-    for (a, b) in a.iter().zip(b) {
-        (0..4).for_each(|lane| sums[lane] += a[lane] * b[lane]);
-    }
-    sums.into_iter().sum::<T>() + a_rest.iter().zip(b_rest).map(|(a, b)| *a * *b).sum::<T>()
-}
-
-/// Lower triangle of `p' p`, four rows of `p` at once.
-#[inline(always)]
-fn gram<T: Real>(rows: &[T], count: usize, matrix: &mut [T]) {
-    matrix.fill(T::ZERO);
-    if count == 0 {
-        return;
-    }
-    for four in rows.chunks(4 * count) {
-        let mut parts = four.chunks_exact(count);
-        let [a, b, c, d] = core::array::from_fn(|_| parts.next().unwrap_or(&[]));
-        let is_whole = d.len() == count;
-        for (i, row) in matrix.chunks_exact_mut(count).enumerate() {
-            let row = &mut row[..=i];
-            if is_whole {
-                let (a, b, c, d) = (&a[..=i], &b[..=i], &c[..=i], &d[..=i]);
-                let [fa, fb, fc, fd] = [a[i], b[i], c[i], d[i]];
-                for (j, sum) in row.iter_mut().enumerate() {
-                    *sum += fa * a[j] + fb * b[j] + fc * c[j] + fd * d[j];
-                }
-            } else {
-                for part in four.chunks_exact(count) {
-                    row.iter_mut().zip(part).for_each(|(sum, value)| *sum += part[i] * *value);
-                }
-            }
-        }
     }
 }

@@ -41,6 +41,7 @@ mod lanes;
 mod laws;
 mod normal;
 mod patterns;
+mod products;
 mod real;
 mod round;
 #[cfg(test)]

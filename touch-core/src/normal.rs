@@ -2,7 +2,8 @@
 
 use crate::circuit::{Circuit, Loaded, TURNED};
 use crate::frame::{Errors, Frame, Says, left_v};
-use crate::held::{Held, dot};
+use crate::held::{Held, Projected};
+use crate::products::dot;
 use crate::real::Real;
 use crate::table::MAX_ELECTRODES;
 use crate::unknown::Detector;
@@ -73,7 +74,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
             for e in 0..n {
                 let index = g * n + e;
                 let read_v = detector.read_v(e, volts[e]);
-                let Some(mut left_v) = left_v(frame, index, T::of(head.full_v), read_v) else { continue };
+                let Some(left_v) = left_v(frame, index, T::of(head.full_v), read_v) else { continue };
                 let mut slope = Vector::<T, K>::ZERO;
                 for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
                     let pattern = Pattern::of(one, T::of(head.radius_m), |values| values[e]);
@@ -81,7 +82,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
                 }
                 if let Some((held, _)) = &mut held {
                     slope.iter_mut().for_each(|slope| *slope *= detector.gain(e));
-                    left_v += noise_v * held.add(index, noise_v, left_v, &slope[..self.count]);
+                    held.note(index, left_v / noise_v, &slope[..self.count]);
                 }
                 if frame.says_at(index) != Says::AtMost {
                     let by_strength = slope.iter().skip(STRENGTH).step_by(PARAMETERS);
@@ -110,34 +111,42 @@ impl<T: Real, const K: usize> Normal<T, K> {
         }
         self.weigh(T::ONE / errors.variance_v2);
         if let Some((held, count)) = held {
-            self.if_known = self.least(radius_deviation);
-            self.leave_out(held, count, T::ONE / noise_v);
+            held.project(count, self.count, T::ONE / noise_v);
+            let projected = held.projected(count);
+            self.if_known = self.least_if_known(&projected, radius_deviation);
+            self.leave_out(&projected);
         }
         self.add_known(circuit, radius_deviation);
     }
 
     /// Takes what steps of the detector could do as well from all sums.
-    fn leave_out(&mut self, held: &mut Held<'_, T>, count: usize, scale: T) {
-        held.project(count, self.count, scale);
-        let (of_left, columns) = held.projected(count);
-        self.cost -= dot(of_left, of_left);
+    fn leave_out(&mut self, Projected { left, columns, scaled, solved }: &Projected<'_, T>) {
+        let count = left.len();
+        // `s' s` is `(U'^-1 s)' (U s)`.
+        self.cost += dot(solved, scaled) - dot(left, left) - dot(solved, solved) + T::of(2.0) * dot(left, solved);
         for i in 0..self.count {
             let column = &columns[i * count..(i + 1) * count];
-            self.pull[i] -= dot(column, of_left);
+            self.pull[i] -= dot(column, left) - dot(column, solved);
             for j in 0..=i {
                 self.matrix[i][j] -= dot(column, &columns[j * count..(j + 1) * count]);
             }
         }
     }
 
-    /// The least sum of squares in the linear theory.
-    fn least(&self, radius_deviation: T) -> T {
+    /// The least sum of squares in the linear theory if the detector were as its table says.
+    fn least_if_known(&self, Projected { left, columns, scaled, solved }: &Projected<'_, T>, radius_deviation: T) -> T {
         let mut all = *self;
+        let count = left.len();
+        // Of what is left and the detector's steps together, `p' p` being `U' U - I`.
+        all.cost += dot(scaled, scaled) - dot(solved, scaled) + T::of(2.0) * dot(left, scaled);
         let weight = T::ONE / (radius_deviation * radius_deviation);
-        (0..self.count).skip(PARAMETERS - 1).step_by(PARAMETERS).for_each(|i| all.matrix[i][i] += weight);
+        for i in 0..self.count {
+            all.pull[i] += dot(&columns[i * count..(i + 1) * count], scaled);
+            all.matrix[i][i] += if i % PARAMETERS == PARAMETERS - 1 { weight } else { T::ZERO };
+        }
         match Factor::of(&all, T::of(1e-6)) {
-            Some(factor) => self.cost - factor.square(self.pull),
-            None => self.cost,
+            Some(factor) => all.cost - factor.square(all.pull),
+            None => all.cost,
         }
     }
 

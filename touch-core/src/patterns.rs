@@ -24,6 +24,8 @@ pub(crate) struct Patterns<'a, T, const K: usize> {
     stencils: [Option<Stencil<T>>; K],
     /// What is there to be read (V), in the readings' order.
     there_v: &'a [T],
+    /// What channels make of a small change.
+    gains: [T; MAX_ELECTRODES],
 }
 
 impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
@@ -35,10 +37,12 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         there_v: &'a [T],
     ) -> Self {
         let stencil = |k: usize| (k < circuit.count).then(|| Stencil::of(detector.table, circuit.loaded[k].spot.at_m));
-        Self { detector, unknown, circuit, stencils: core::array::from_fn(stencil), there_v }
+        let mut gains = [T::ONE; MAX_ELECTRODES];
+        gains.iter_mut().enumerate().take(detector.table.electrodes()).for_each(|(e, gain)| *gain = detector.gain(e));
+        Self { detector, unknown, circuit, stencils: core::array::from_fn(stencil), there_v, gains }
     }
 
-    /// Changes of all readings (V) by one deviation in each direction: rows of readings, each of as many numbers as there are directions.
+    /// Changes of all readings (V) by one deviation in each direction: a row of readings for each.
     pub fn write(&self, volts: &mut [T]) {
         at_once(
             #[inline(always)]
@@ -48,22 +52,22 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
 
     #[inline(always)]
     fn write_all(&self, volts: &mut [T]) {
-        let stride = self.unknown.directions.len();
         volts.fill(T::ZERO);
-        for (column, direction) in self.unknown.directions.iter().enumerate() {
-            let step = self.detector.moved.as_ref().map_or(T::ZERO, |(_, moved)| moved.steps[column]);
+        let rows = volts.chunks_exact_mut(self.there_v.len());
+        for ((number, direction), row) in self.unknown.directions.iter().enumerate().zip(rows) {
+            let step = self.detector.moved.as_ref().map_or(T::ZERO, |(_, moved)| moved.steps[number]);
             let tables = [(direction.table, T::ONE), (direction.square, step)];
             for (which, share) in tables.into_iter().filter_map(|(which, share)| Some((which?, share))) {
-                self.add_fields(which, share, column, stride, volts);
+                self.add_fields(which, share, row);
             }
             let changes = self.unknown.changes_of(direction);
-            changes.iter().for_each(|change| self.add_change(*change, column, stride, volts));
+            changes.iter().for_each(|change| self.add_change(*change, row));
         }
     }
 
     /// Adds so much of what a table changes.
     #[inline(always)]
-    fn add_fields(&self, which: usize, share: T, column: usize, stride: usize, volts: &mut [T]) {
+    fn add_fields(&self, which: usize, share: T, volts: &mut [T]) {
         let (circuit, n) = (self.circuit, self.detector.table.electrodes());
         let pads_ohm = &self.unknown.pads_ohm[which * pairs(n)..(which + 1) * pairs(n)];
         let mut fields = [[T::ZERO; MAX_ELECTRODES]; K];
@@ -95,19 +99,19 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
                     row[e] -= fields[e] * current + one.currents[e] * field;
                 }
             }
-            self.add_row(g, share, &row, column, stride, volts);
+            self.add_row(g, share, &row, &mut volts[g * n..(g + 1) * n]);
         }
     }
 
     /// Adds what changes of a column of the impedances (ohm) change in a row of readings.
     #[inline(always)]
-    fn add_row(&self, g: usize, share: T, ohm: &[T], column: usize, stride: usize, volts: &mut [T]) {
-        let n = self.detector.table.electrodes();
+    fn add_row(&self, g: usize, share: T, ohm: &[T], volts: &mut [T]) {
+        let n = volts.len();
         let drive_v = T::of(self.detector.table.head().drive_v);
-        let load_ohm = self.circuit.loads_ohm[g];
-        for e in 0..n {
-            let change_v = ((drive_v - self.there_v[g * n + e]) * ohm[g] - drive_v * ohm[e]) / load_ohm;
-            volts[(g * n + e) * stride + column] += share * self.detector.gain(e) * change_v;
+        let per_ohm = share / self.circuit.loads_ohm[g];
+        let there_v = &self.there_v[g * n..(g + 1) * n];
+        for (((volts, ohm_e), there_v), gain) in volts.iter_mut().zip(ohm).zip(there_v).zip(&self.gains) {
+            *volts += per_ohm * *gain * ((drive_v - *there_v) * ohm[g] - drive_v * *ohm_e);
         }
     }
 
@@ -143,10 +147,10 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
     }
 
     /// Adds what needs no fields.
-    fn add_change(&self, change: Change, column: usize, stride: usize, volts: &mut [T]) {
+    fn add_change(&self, change: Change, volts: &mut [T]) {
         let n = self.detector.table.electrodes();
         let Some((_, moved)) = &self.detector.moved else { return };
-        let mut add = |g: usize, e: usize, change_v: T| volts[(g * n + e) * stride + column] += change_v;
+        let mut add = |g: usize, e: usize, change_v: T| volts[g * n + e] += change_v;
         let drive_v = T::of(self.detector.table.head().drive_v);
         let per_ohm = |g: usize, e: usize| (drive_v - self.there_v[g * n + e]) / self.circuit.loads_ohm[g];
         match change {

@@ -6,11 +6,25 @@ use core::iter::{Product, Sum};
 use num_traits::float::{FloatCore, TotalOrder};
 use num_traits::{ConstOne, ConstZero, NumAssign};
 
+use crate::lanes::Lanes;
+
 /// A number to work with: `f32` or `f64`.
 ///
 /// Roots, powers and logarithms are those of `libm` on all machines, so that a computer finds in `f32` what a board does, to the digit.
 pub trait Real:
-    FloatCore + NumAssign + ConstZero + ConstOne + TotalOrder + Sum + Product + Default + Debug + Send + Sync + 'static
+    Lanes
+    + FloatCore
+    + NumAssign
+    + ConstZero
+    + ConstOne
+    + TotalOrder
+    + Sum
+    + Product
+    + Default
+    + Debug
+    + Send
+    + Sync
+    + 'static
 {
     /// The nearest one to a number.
     fn of(value: impl Into<f64>) -> Self;

@@ -9,6 +9,7 @@ use core::ops::Range;
 
 use crate::fields::{Sample, Stencil};
 use crate::lanes::at_once;
+use crate::products::add;
 use crate::real::Real;
 use crate::spline::{interval, weights};
 use crate::table::{MAX_ELECTRODES, Table};
@@ -62,6 +63,14 @@ pub struct Unknown<'a> {
     pub own_pads_ohm: &'a [f32],
 }
 
+/// Sums up so much of each table's numbers at a coefficient.
+#[inline(always)]
+fn blend(shares: &[f32], node: &[f32], sums: &mut [f32]) {
+    for (share, of_table) in shares.iter().zip(node.chunks_exact(sums.len())) {
+        add(sums, *share, of_table);
+    }
+}
+
 /// How many elements a lower triangle has.
 pub(crate) const fn pairs(side: usize) -> usize {
     side * (side + 1) / 2
@@ -106,9 +115,7 @@ impl Unknown<'_> {
         for (which, node) in stencil.nodes.into_iter().enumerate() {
             let mut change = [0.0f32; MAX_ELECTRODES + 1];
             let change = &mut change[..count];
-            for (share, of_table) in shares.iter().zip(self.node(node, table.electrodes()).chunks_exact(count)) {
-                change.iter_mut().zip(of_table).for_each(|(sum, ohm)| *sum += share * ohm);
-            }
+            blend(shares, self.node(node, table.electrodes()), change);
             let [value, x, y, xx, xy, yy] = stencil.weights.each_ref().map(|weights| weights[which]);
             for (q, ohm) in change.iter().enumerate() {
                 let ohm = T::of(*ohm);
@@ -166,7 +173,7 @@ pub(crate) struct Layout {
 }
 
 /// Adds so much of one of equal parts.
-fn add<T: Real>(sums: &mut [T], share: T, parts: &[f32], which: usize) {
+fn add_part<T: Real>(sums: &mut [T], share: T, parts: &[f32], which: usize) {
     let count = sums.len();
     let part = parts.get(which * count..(which + 1) * count).unwrap_or(&[]);
     sums.iter_mut().zip(part).for_each(|(sum, ohm)| *sum += share * T::of(*ohm));
@@ -216,9 +223,9 @@ impl Layout {
             for (which, share) in [(direction.table, step), (direction.square, half_square)] {
                 let Some(which) = which.filter(|_| share != T::ZERO) else { continue };
                 shares[which] = share.to_f32().unwrap_or(0.0);
-                add(pads, share, unknown.pads_ohm, which);
-                add(distances, share, unknown.distances_ohm, which);
-                add(walls, share, unknown.walls, which);
+                add_part(pads, share, unknown.pads_ohm, which);
+                add_part(distances, share, unknown.distances_ohm, which);
+                add_part(walls, share, unknown.walls, which);
             }
             for change in unknown.changes_of(direction) {
                 match *change {

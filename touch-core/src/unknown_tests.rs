@@ -156,7 +156,7 @@ fn patterns_are_differences() {
                     let (mut there_v, mut all) = (std::vec![0.0; N * N], std::vec![0.0; N * N * DIRECTIONS]);
                     there_v.chunks_exact_mut(N).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
                     crate::patterns::Patterns::new(detector, unknown, &circuit, &there_v).write(&mut all);
-                    all.chunks_exact(DIRECTIONS).map(|row| row[direction]).collect::<Vec<_>>()
+                    all[direction * N * N..(direction + 1) * N * N].to_vec()
                 });
                 let largest = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));
                 let off = expected.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -191,11 +191,11 @@ fn the_sum_of_squares_is_that_of_the_posteriors_mean() {
             held.take(kept.count);
             let mut mean = [0.0; DIRECTIONS];
             held.posterior(&kept, &mut mean);
-            let patterns: Vec<Vec<f64>> = (0..N * N).map(|index| held.pattern(index, kept.count).to_vec()).collect();
+            let patterns: Vec<Vec<f64>> = (0..DIRECTIONS).map(|direction| held.pattern(direction).to_vec()).collect();
             let predicted = read_v(&table, &made_up, [0.0; DIRECTIONS], spots);
             let left = |steps: &[f64; DIRECTIONS]| {
                 let of_reading = |index: usize| {
-                    let by_steps: f64 = patterns[index].iter().zip(steps).map(|(p, s)| p * s).sum();
+                    let by_steps: f64 = patterns.iter().zip(steps).map(|(pattern, s)| pattern[index] * s).sum();
                     ((read[index] - predicted[index]) / noise_v - by_steps).powi(2)
                 };
                 (0..N * N).map(of_reading).sum::<f64>() + steps.iter().map(|s| s * s).sum::<f64>()
