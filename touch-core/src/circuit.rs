@@ -118,6 +118,8 @@ pub(crate) struct Loaded<T> {
     per_ln_radius: T,
     /// Moment of current that a slope of potential drives (S m2).
     pub moment_s_m2: T,
+    /// Its derivative by the contact's own field (S m2/ohm).
+    pub moment_by_own: T,
     /// Half of its derivatives by the parameters.
     pub half_moment_by: [T; PARAMETERS],
     /// Currents for 1 A into each electrode.
@@ -141,6 +143,7 @@ impl<T: Real> Loaded<T> {
         even_ohm: T::ZERO,
         per_ln_radius: T::ZERO,
         moment_s_m2: T::ZERO,
+        moment_by_own: T::ZERO,
         half_moment_by: [T::ZERO; PARAMETERS],
         currents: [T::ZERO; MAX_ELECTRODES],
         slopes_ohm_per_m: [[T::ZERO; MAX_ELECTRODES]; 2],
@@ -177,6 +180,7 @@ impl<T: Real> Loaded<T> {
         let by_ln_radius = half_by(Disc::of(head, spread_m * (T::ONE + T::of(STEP)), own_ohm, ohm), T::of(STEP));
         let by_place = |d: usize| by_own * T::of(head.radius_m) * self.sample.slope[d][n];
         let by_wider = by_own * self.per_ln_radius * self.sample.wider[n];
+        self.moment_by_own = T::of(2.0) * by_own;
         self.half_moment_by = [by_place(0), by_place(1), by_ln_ohm, by_ln_radius + by_wider];
     }
 
@@ -229,6 +233,10 @@ pub(crate) struct Circuit<T, const K: usize> {
     pub constant_ohm: PerElectrode<T>,
     /// `Z[g][g]` with the switch (ohm).
     pub loads_ohm: PerElectrode<T>,
+    /// Currents that flow for potentials at the contacts besides (S): symmetric.
+    pub inverse_s: [[T; K]; K],
+    /// Slopes of the field at a contact from another one (ohm/m), by the place of the first.
+    pub slopes_ohm_per_m: [[[T; 2]; K]; K],
 }
 
 impl<T: Real, const K: usize> Circuit<T, K> {
@@ -237,6 +245,8 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         loaded: [Loaded::NONE; K],
         constant_ohm: [T::ZERO; MAX_ELECTRODES],
         loads_ohm: [T::ZERO; MAX_ELECTRODES],
+        inverse_s: [[T::ZERO; K]; K],
+        slopes_ohm_per_m: [[[T::ZERO; 2]; K]; K],
     };
 
     /// Solves for some contacts, `K` at most; `false` if their fields cannot be those of contacts, as when two are at one place.
@@ -246,17 +256,15 @@ impl<T: Real, const K: usize> Circuit<T, K> {
             loaded.load(detector, *spot);
         }
         let mut matrix = [[T::ZERO; K]; K];
-        // Derivatives of the field at contact k from contact l, by the place of k.
-        let mut slopes = [[[T::ZERO; 2]; K]; K];
         for k in 0..self.count {
             matrix[k][k] = self.loaded[k].ohm;
             for l in (0..self.count).filter(|l| *l != k) {
                 let (ohm, slope) = self.between(detector, k, l);
-                (matrix[k][l], slopes[k][l]) = (ohm, slope);
+                (matrix[k][l], self.slopes_ohm_per_m[k][l]) = (ohm, slope);
             }
         }
         self.find_currents(detector.table, &matrix) && {
-            self.find_slopes(detector.table, &slopes);
+            self.find_slopes(detector.table);
             self.find_loads(detector)
         }
     }
@@ -308,6 +316,13 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         if !(conductance_s > T::ZERO && conductance_s.is_finite()) {
             return false;
         }
+        for k in 0..count {
+            let mut right = [T::ZERO; K];
+            right[k] = T::ONE;
+            let potential = solve(right);
+            let share = of_one[k] / conductance_s;
+            (0..count).for_each(|l| self.inverse_s[k][l] = potential[l] - share * of_one[l]);
+        }
         for e in 0..table.electrodes() {
             let mut right = [T::ZERO; K];
             (0..count).for_each(|k| right[k] = self.loaded[k].sample.value[e]);
@@ -319,12 +334,12 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         true
     }
 
-    fn find_slopes(&mut self, table: &Table<'_>, slopes: &[[[T; 2]; K]; K]) {
+    fn find_slopes(&mut self, table: &Table<'_>) {
         for k in 0..self.count {
             for d in 0..2 {
                 for e in 0..table.electrodes() {
                     let others = (0..self.count).filter(|l| *l != k);
-                    let by_others: T = others.map(|l| slopes[k][l][d] * self.loaded[l].currents[e]).sum();
+                    let by_others: T = others.map(|l| self.slopes_ohm_per_m[k][l][d] * self.loaded[l].currents[e]).sum();
                     self.loaded[k].slopes_ohm_per_m[d][e] = self.loaded[k].sample.slope[d][e] - by_others;
                 }
             }

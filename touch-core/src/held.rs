@@ -136,7 +136,7 @@ impl<T: Real> Held<'_, T> {
         says: impl Fn(usize, T) -> bool,
     ) -> Option<Kept<D>> {
         self.note_there(detector, circuit);
-        Patterns::new(detector, unknown, circuit, self.there_v).write(self.patterns);
+        Patterns::new(detector, unknown, circuit, self.there_v).write(self.patterns, self.left);
         let readings = self.there_v.len();
         for (index, scale) in self.left.iter_mut().enumerate() {
             let read_v = detector.read_v(index % detector.table.electrodes(), self.there_v[index]);

@@ -81,7 +81,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
                     slopes.add(circuit, k, &pattern, T::ONE - volts[e] / T::of(head.drive_v), &mut slope);
                 }
                 if let Some((held, _)) = &mut held {
-                    slope.iter_mut().for_each(|slope| *slope *= detector.gain(e));
+                    slope.iter_mut().for_each(|slope| *slope *= detector.gain(e, volts[e]));
                     held.note(index, left_v / noise_v, &slope[..self.count]);
                 }
                 if frame.says_at(index) != Says::AtMost {

@@ -6,15 +6,16 @@
 //! dZ = dE - dF' U - U' dF + U' dN U
 //! ```
 //!
-//! (see [`circuit`](crate::circuit)), and the readings by `((Vcc - V) dZ[g][g] - Vcc dZ[e][g]) / (Z[g][g] + R)`. What the contacts' own fields change is their resistance's,
-//! which is fitted; of the couples, and of how current crowds, the change is left out.
+//! (see [`circuit`](crate::circuit)), less what couples of currents change, and the readings by `((Vcc - V) dZ[g][g] - Vcc dZ[e][g]) / (Z[g][g] + R)`. What the contacts' own
+//! fields change is their resistance's, which is fitted, and their moment's. Of what drives a couple, the change of the field's slope between contacts is left out.
 
 use crate::circuit::Circuit;
 use crate::fields::Stencil;
 use crate::lanes::at_once;
 use crate::real::Real;
 use crate::table::MAX_ELECTRODES;
-use crate::unknown::{Change, Detector, Knots, Unknown, of_pair, pairs};
+use crate::products::add;
+use crate::unknown::{Change, Detector, Fields, Knots, Unknown, of_pair, pairs};
 
 /// The readings of contacts, with what their changes need.
 pub(crate) struct Patterns<'a, T, const K: usize> {
@@ -24,8 +25,6 @@ pub(crate) struct Patterns<'a, T, const K: usize> {
     stencils: [Option<Stencil<T>>; K],
     /// What is there to be read (V), in the readings' order.
     there_v: &'a [T],
-    /// What channels make of a small change.
-    gains: [T; MAX_ELECTRODES],
 }
 
 impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
@@ -37,22 +36,24 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         there_v: &'a [T],
     ) -> Self {
         let stencil = |k: usize| (k < circuit.count).then(|| Stencil::of(detector.table, circuit.loaded[k].spot.at_m));
-        let mut gains = [T::ONE; MAX_ELECTRODES];
-        gains.iter_mut().enumerate().take(detector.table.electrodes()).for_each(|(e, gain)| *gain = detector.gain(e));
-        Self { detector, unknown, circuit, stencils: core::array::from_fn(stencil), there_v, gains }
+        Self { detector, unknown, circuit, stencils: core::array::from_fn(stencil), there_v }
     }
 
-    /// Changes of all readings (V) by one deviation in each direction: a row of readings for each.
-    pub fn write(&self, volts: &mut [T]) {
+    /// Changes of all readings (V) by one deviation in each direction: a row of readings for each; `gains` is room for so many.
+    pub fn write(&self, volts: &mut [T], gains: &mut [T]) {
         at_once(
             #[inline(always)]
-            || self.write_all(volts),
+            || self.write_all(volts, gains),
         );
     }
 
     #[inline(always)]
-    fn write_all(&self, volts: &mut [T]) {
+    fn write_all(&self, volts: &mut [T], gains: &mut [T]) {
+        let n = self.detector.table.electrodes();
         volts.fill(T::ZERO);
+        for (index, (gain, there_v)) in gains.iter_mut().zip(self.there_v).enumerate() {
+            *gain = self.detector.gain(index % n, *there_v);
+        }
         let rows = volts.chunks_exact_mut(self.there_v.len());
         for ((number, direction), row) in self.unknown.directions.iter().enumerate().zip(rows) {
             let step = self.detector.moved.as_ref().map_or(T::ZERO, |(_, moved)| moved.steps[number]);
@@ -61,7 +62,9 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
                 self.add_fields(which, share, row);
             }
             let changes = self.unknown.changes_of(direction);
-            changes.iter().for_each(|change| self.add_change(*change, row));
+            changes.iter().for_each(|change| self.add_change_there(*change, row));
+            row.iter_mut().zip(&*gains).for_each(|(volts, gain)| *volts *= *gain);
+            changes.iter().for_each(|change| self.add_change_read(*change, row));
         }
     }
 
@@ -69,38 +72,71 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
     #[inline(always)]
     fn add_fields(&self, which: usize, share: T, volts: &mut [T]) {
         let (circuit, n) = (self.circuit, self.detector.table.electrodes());
-        let pads_ohm = &self.unknown.pads_ohm[which * pairs(n)..(which + 1) * pairs(n)];
-        let mut fields = [[T::ZERO; MAX_ELECTRODES]; K];
-        for (stencil, fields) in self.stencils.iter().zip(&mut fields) {
-            let Some(stencil) = stencil else { break };
+        let loaded = &circuit.loaded[..circuit.count];
+        let mut fields = [Fields::NONE; K];
+        for (stencil, fields) in self.stencils.iter().flatten().zip(&mut fields) {
             self.unknown.fields_at(n, which, stencil, fields);
         }
-        let mut less = [[T::ZERO; MAX_ELECTRODES]; K];
+        // What drives currents besides those that flow: `dU - dN U`; and for the fields, whose change is there twice, half of the latter.
+        let mut driven = fields.map(|fields| fields.value);
         for k in 0..circuit.count {
             for l in 0..k {
-                let half_ohm = T::of(0.5) * self.between_ohm(which, [k, l], &fields);
-                for e in 0..n {
-                    less[k][e] += half_ohm * circuit.loaded[l].currents[e];
-                    less[l][e] += half_ohm * circuit.loaded[k].currents[e];
-                }
+                let ohm = self.between_ohm(which, [k, l], &fields);
+                add(&mut driven[k], -ohm, &loaded[l].currents);
+                add(&mut driven[l], -ohm, &loaded[k].currents);
             }
         }
-        for (fields, less) in fields.iter_mut().zip(&less).take(circuit.count) {
-            fields.iter_mut().zip(less).for_each(|(field, less)| *field -= *less);
+        let mut halved = [[T::ZERO; MAX_ELECTRODES]; K];
+        for ((halved, fields), driven) in halved.iter_mut().zip(&fields).zip(&driven).take(circuit.count) {
+            add(halved, T::of(0.5), &fields.value);
+            add(halved, T::of(0.5), driven);
         }
-        let mut row = [T::ZERO; MAX_ELECTRODES];
+        let couples = self.couples_ohm_per_m(&fields, &driven);
+        let pads_ohm = &self.unknown.pads_ohm[which * pairs(n)..(which + 1) * pairs(n)];
         for g in 0..n {
+            let mut row = [T::ZERO; MAX_ELECTRODES];
             for (e, ohm) in row.iter_mut().enumerate().take(n) {
                 *ohm = T::of(of_pair(pads_ohm, e, g));
             }
-            for (one, fields) in circuit.loaded.iter().zip(&fields).take(circuit.count) {
-                let (current, field) = (one.currents[g], fields[g]);
-                for e in 0..n {
-                    row[e] -= fields[e] * current + one.currents[e] * field;
+            for ((one, fields), couples) in loaded.iter().zip(&halved).zip(&couples) {
+                add(&mut row, -one.currents[g], fields);
+                add(&mut row, -fields[g], &one.currents);
+                for (driving, couple) in one.driving_ohm_per_m.iter().zip(couples) {
+                    add(&mut row, -driving[g], couple);
+                    add(&mut row, -couple[g], driving);
                 }
             }
             self.add_row(g, share, &row, &mut volts[g * n..(g + 1) * n]);
         }
+    }
+
+    /// Half of what changes of what drives the couples of currents and of their moments are of the impedances, over what drives them.
+    #[inline(always)]
+    fn couples_ohm_per_m(
+        &self,
+        fields: &[Fields<T>; K],
+        driven: &[[T; MAX_ELECTRODES]; K],
+    ) -> [[[T; MAX_ELECTRODES]; 2]; K] {
+        let (circuit, n) = (self.circuit, self.detector.table.electrodes());
+        let mut couples = [[[T::ZERO; MAX_ELECTRODES]; 2]; K];
+        let mut currents = [[T::ZERO; MAX_ELECTRODES]; K];
+        for (currents, row) in currents.iter_mut().zip(&circuit.inverse_s).take(circuit.count) {
+            row.iter().zip(driven).take(circuit.count).for_each(|(share, driven)| add(currents, *share, driven));
+        }
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            let half_moment = T::of(0.5) * fields[k].own_ohm[0] * one.moment_by_own;
+            for d in 0..2 {
+                let couple = &mut couples[k][d];
+                add(couple, one.moment_s_m2, &fields[k].slope[d]);
+                add(couple, -T::of(0.5) * one.moment_s_m2 * one.sample.slope[d][n], &currents[k]);
+                add(couple, -T::of(0.5) * one.moment_s_m2 * fields[k].own_ohm[1 + d], &one.currents);
+                for l in (0..circuit.count).filter(|l| *l != k) {
+                    add(couple, -one.moment_s_m2 * circuit.slopes_ohm_per_m[k][l][d], &currents[l]);
+                }
+                add(couple, half_moment, &one.driving_ohm_per_m[d]);
+            }
+        }
+        couples
     }
 
     /// Adds what changes of a column of the impedances (ohm) change in a row of readings.
@@ -110,14 +146,14 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         let drive_v = T::of(self.detector.table.head().drive_v);
         let per_ohm = share / self.circuit.loads_ohm[g];
         let there_v = &self.there_v[g * n..(g + 1) * n];
-        for (((volts, ohm_e), there_v), gain) in volts.iter_mut().zip(ohm).zip(there_v).zip(&self.gains) {
-            *volts += per_ohm * *gain * ((drive_v - *there_v) * ohm[g] - drive_v * *ohm_e);
+        for ((volts, ohm_e), there_v) in volts.iter_mut().zip(ohm).zip(there_v) {
+            *volts += per_ohm * ((drive_v - *there_v) * ohm[g] - drive_v * *ohm_e);
         }
     }
 
     /// Change of the field between two contacts by a table (ohm).
     #[inline(always)]
-    fn between_ohm(&self, which: usize, contacts: [usize; 2], fields: &[[T; MAX_ELECTRODES]; K]) -> T {
+    fn between_ohm(&self, which: usize, contacts: [usize; 2], fields: &[Fields<T>; K]) -> T {
         let (table, n) = (self.detector.table, self.detector.table.electrodes());
         let [one, other] = contacts.map(|k| &self.circuit.loaded[k]);
         let way_m = [0, 1].map(|d| one.spot.at_m[d] - other.spot.at_m[d]);
@@ -141,41 +177,47 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         }
         let [k, l] = contacts;
         for e in 0..n {
-            ohm += fields[k][e] * other.walls_ohm[e] + fields[l][e] * one.walls_ohm[e];
+            ohm += fields[k].value[e] * other.walls_ohm[e] + fields[l].value[e] * one.walls_ohm[e];
         }
         ohm
     }
 
-    /// Adds what needs no fields.
-    fn add_change(&self, change: Change, volts: &mut [T]) {
+    /// Adds what needs no fields: changes of what is there.
+    fn add_change_there(&self, change: Change, volts: &mut [T]) {
         let n = self.detector.table.electrodes();
         let Some((_, moved)) = &self.detector.moved else { return };
-        let mut add = |g: usize, e: usize, change_v: T| volts[g * n + e] += change_v;
         let drive_v = T::of(self.detector.table.head().drive_v);
-        let per_ohm = |g: usize, e: usize| (drive_v - self.there_v[g * n + e]) / self.circuit.loads_ohm[g];
+        let per_ohm = |index: usize| (drive_v - self.there_v[index]) / self.circuit.loads_ohm[index / n];
         match change {
-            Change::Gain(e, log) => {
-                (0..n).for_each(|g| add(g, e, T::of(log) * moved.gains[e] * self.there_v[g * n + e]));
-            }
-            Change::Offset(e, offset_v) => (0..n).for_each(|g| add(g, e, T::of(offset_v))),
-            Change::Bow(e, height_v) => {
-                (0..n).for_each(|g| add(g, e, T::of(height_v) * self.unknown.bow(e, self.there_v[g * n + e])));
-            }
             Change::Switch(log) => {
                 let ohm = T::of(log) * moved.switch_ohm;
-                for (g, e) in (0..n).flat_map(|g| (0..n).map(move |e| (g, e))) {
-                    add(g, e, moved.gains[e] * ohm * per_ohm(g, e));
-                }
+                volts.iter_mut().enumerate().for_each(|(index, volts)| *volts += ohm * per_ohm(index));
             }
             Change::Pad(g, log) => {
                 let ohm = T::of(log) * moved.own_pads_ohm[g];
-                for e in 0..n {
+                for (e, volts) in volts.iter_mut().skip(g * n).take(n).enumerate() {
                     // The grounded pad itself is nearer to ground by what its own resistance takes.
-                    let over =
-                        if e == g { -self.there_v[g * n + g] / self.circuit.loads_ohm[g] } else { per_ohm(g, e) };
-                    add(g, e, moved.gains[e] * ohm * over);
+                    let own = -self.there_v[g * n + g] / self.circuit.loads_ohm[g];
+                    *volts += ohm * if e == g { own } else { per_ohm(g * n + e) };
                 }
             }
+            Change::Gain(..) | Change::Offset(..) | Change::Bow(..) => {}
+        }
+    }
+
+    /// Adds what needs no fields: changes of what a channel makes of it.
+    fn add_change_read(&self, change: Change, volts: &mut [T]) {
+        let n = self.detector.table.electrodes();
+        let Some((_, moved)) = &self.detector.moved else { return };
+        let mut of_channel = |e: usize, read_v: &dyn Fn(T) -> T| {
+            let of_e = volts.iter_mut().zip(self.there_v).skip(e).step_by(n);
+            of_e.for_each(|(volts, there_v)| *volts += read_v(*there_v));
+        };
+        match change {
+            Change::Gain(e, log) => of_channel(e, &|there_v| T::of(log) * moved.gains[e] * there_v),
+            Change::Offset(e, offset_v) => of_channel(e, &|_| T::of(offset_v)),
+            Change::Bow(e, height_v) => of_channel(e, &|there_v| T::of(height_v) * self.unknown.bow(e, there_v)[0]),
+            Change::Switch(..) | Change::Pad(..) => {}
         }
     }
 }

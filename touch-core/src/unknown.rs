@@ -88,11 +88,16 @@ impl Unknown<'_> {
         self.changes.get(direction.changes.clone()).unwrap_or(&[])
     }
 
-    /// A channel's bow over its height at a voltage (V).
-    pub(crate) fn bow<T: Real>(&self, e: usize, volts: T) -> T {
+    /// A channel's bow over its height at a voltage (V), and its derivative (1/V).
+    pub(crate) fn bow<T: Real>(&self, e: usize, volts: T) -> [T; 2] {
         let [low_v, high_v] = self.ranges_v.get(e).map_or([T::ZERO, T::ONE], |range_v| range_v.map(T::of));
-        let share = ((volts - low_v) / (high_v - low_v)).max(T::ZERO).min(T::ONE);
-        T::of(4.0) * share * (T::ONE - share)
+        let per_v = T::ONE / (high_v - low_v);
+        let share = per_v * (volts - low_v);
+        if !(share > T::ZERO && share < T::ONE) {
+            return [T::ZERO; 2];
+        }
+        let four = T::of(4.0);
+        [four * share * (T::ONE - share), four * per_v * (T::ONE - share - share)]
     }
 
     /// Changes of all tables at a coefficient.
@@ -129,18 +134,40 @@ impl Unknown<'_> {
         }
     }
 
-    /// Change of the electrodes' fields at a place by a table (ohm).
+    /// What a table changes at a place.
     #[inline(always)]
-    pub(crate) fn fields_at<T: Real>(&self, electrodes: usize, which: usize, stencil: &Stencil<T>, ohm: &mut [T]) {
+    pub(crate) fn fields_at<T: Real>(&self, electrodes: usize, which: usize, stencil: &Stencil<T>, at: &mut Fields<T>) {
         let first = which * (electrodes + 1);
-        let mut sums = [0.0f32; MAX_ELECTRODES];
-        for (node, weight) in stencil.nodes.into_iter().zip(stencil.weights[0]) {
-            let weight = weight.to_f32().unwrap_or(0.0);
-            let fields = self.node(node, electrodes).get(first..first + electrodes).unwrap_or(&[]);
-            sums.iter_mut().zip(fields).for_each(|(sum, field)| *sum += weight * field);
+        let mut sums = [[0.0f32; MAX_ELECTRODES + 1]; 3];
+        for (index, node) in stencil.nodes.into_iter().enumerate() {
+            let of_table = self.node(node, electrodes).get(first..first + electrodes + 1).unwrap_or(&[]);
+            for (sums, weights) in sums.iter_mut().zip(&stencil.weights) {
+                add(sums, weights[index].to_f32().unwrap_or(0.0), of_table);
+            }
         }
-        ohm.iter_mut().zip(sums).take(electrodes).for_each(|(to, sum)| *to = T::of(sum));
+        let [value, slope @ ..] = &sums;
+        at.own_ohm = sums.each_ref().map(|sums| T::of(sums[electrodes]));
+        let take = |to: &mut [T; MAX_ELECTRODES], from: &[f32]| {
+            to.iter_mut().zip(from).take(electrodes).for_each(|(to, from)| *to = T::of(*from));
+        };
+        take(&mut at.value, value);
+        at.slope.iter_mut().zip(slope).for_each(|(to, from)| take(to, from));
     }
+}
+
+/// What a table changes at a place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fields<T> {
+    /// Fields of the electrodes (ohm), and their derivatives by the place (ohm/m).
+    pub value: [T; MAX_ELECTRODES],
+    pub slope: [[T; MAX_ELECTRODES]; 2],
+    /// The disc's own field (ohm), and its derivatives (ohm/m).
+    pub own_ohm: [T; 3],
+}
+
+impl<T: Real> Fields<T> {
+    pub const NONE: Self =
+        Self { value: [T::ZERO; MAX_ELECTRODES], slope: [[T::ZERO; MAX_ELECTRODES]; 2], own_ohm: [T::ZERO; 3] };
 }
 
 /// A detector after steps in the directions, as far as that is the same at all places. Larger by its parts than a board's stack has room for, it is kept where the
@@ -297,13 +324,13 @@ impl<'a, T: Real> Detector<'a, T> {
     /// What a channel makes of a voltage, but for what the table says of it (V).
     pub fn read_v(&self, e: usize, volts: T) -> T {
         self.moved.as_ref().map_or(volts, |(unknown, moved)| {
-            moved.gains[e] * volts + moved.offsets_v[e] + moved.bows_v[e] * unknown.bow(e, volts)
+            moved.gains[e] * volts + moved.offsets_v[e] + moved.bows_v[e] * unknown.bow(e, volts)[0]
         })
     }
 
-    /// What a channel makes of a small change.
-    pub fn gain(&self, e: usize) -> T {
-        self.moved.as_ref().map_or(T::ONE, |(_, moved)| moved.gains[e])
+    /// What a channel makes of a small change of a voltage.
+    pub fn gain(&self, e: usize, volts: T) -> T {
+        self.moved.as_ref().map_or(T::ONE, |(unknown, moved)| moved.gains[e] + moved.bows_v[e] * unknown.bow(e, volts)[1])
     }
 
     /// The part of the field between places that goes by their distance (m): its value (ohm), and its derivative by that (ohm/m).
