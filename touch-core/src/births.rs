@@ -110,8 +110,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
     fn new_square(&mut self, change: &[T], factor: &Factor<T, K>) -> T {
         let all = dot(change, change);
         let mut shared = Vector::<T, K>::ZERO;
-        let by_detector =
-            self.held.shared(change, self.kept.count, T::ONE / self.noise_v, &mut shared[..self.normal.count]);
+        let by_detector = self.held.shared(change, self.kept.count, &mut shared[..self.normal.count]);
         (all - by_detector - factor.square(shared)).max(T::of(LEAST_NEW) * all)
     }
 }

@@ -339,7 +339,8 @@ impl<T: Real, const K: usize> Circuit<T, K> {
             for d in 0..2 {
                 for e in 0..table.electrodes() {
                     let others = (0..self.count).filter(|l| *l != k);
-                    let by_others: T = others.map(|l| self.slopes_ohm_per_m[k][l][d] * self.loaded[l].currents[e]).sum();
+                    let by_others: T =
+                        others.map(|l| self.slopes_ohm_per_m[k][l][d] * self.loaded[l].currents[e]).sum();
                     self.loaded[k].slopes_ohm_per_m[d][e] = self.loaded[k].sample.slope[d][e] - by_others;
                 }
             }

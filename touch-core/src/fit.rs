@@ -232,7 +232,8 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// Begins to step from a scene to where it fits best, so many steps at most.
     pub fn begin(&mut self, scene: Scene<T, K, D>, radius_deviation: T, steps: u8) {
-        self.on.is_held &= scene == self.scene;
+        self.on.is_held &= scene == self.scene && self.on.damping == T::ONE;
+        self.on.damping = T::ONE;
         self.worth = T::of(if steps <= TRYING { ROUGHLY } else { EXACTLY });
         (self.scene, self.trial, self.radius_deviation) = (scene, scene, radius_deviation);
         (self.damping, self.steps, self.tries, self.has_looked) = (T::of(FIRST_DAMPING), steps, 0, false);
@@ -312,7 +313,7 @@ fn look<T: Real, const K: usize, const D: usize>(
     if scene.count == 0 || !circuit.solve(&detector, scene.spots()) {
         return false;
     }
-    normal.sum_up(&detector, circuit, frame, errors, radius_deviation, None);
+    normal.sum_up(&detector, circuit, frame, errors, radius_deviation);
     work.worked_out(scene.count);
     normal.objective().is_finite()
 }

@@ -92,7 +92,7 @@ pub(crate) struct Held<'m, T> {
     products: &'m mut [T],
     taken: &'m mut [T],
     columns: &'m mut [T],
-    /// Of the last look: derivatives (V), a row of readings for each parameter, and what is left, in noise.
+    /// Of the last look, in noise: derivatives, a row of readings for each parameter, and what is left.
     slopes: &'m mut [T],
     left: &'m mut [T],
 }
@@ -126,13 +126,15 @@ impl<const D: usize> Kept<D> {
 }
 
 impl<T: Real> Held<'_, T> {
-    /// Takes the patterns of contacts in noise of a deviation (V), of those readings that say something; `None` if they make no sense.
+    /// Takes the patterns of contacts in noise of a deviation (V), of those readings that say something; steps are damped by more than one in place of `I`. `None` if they make
+    /// no sense.
     pub fn hold<const K: usize, const D: usize>(
         &mut self,
         detector: &Detector<'_, T>,
         unknown: &Unknown<'_>,
         circuit: &Circuit<T, K>,
         noise_v: T,
+        damping: T,
         says: impl Fn(usize, T) -> bool,
     ) -> Option<Kept<D>> {
         self.note_there(detector, circuit);
@@ -155,7 +157,7 @@ impl<T: Real> Held<'_, T> {
                 kept.count += 1;
             }
         }
-        self.factorise(kept.count)?;
+        self.factorise(kept.count, damping)?;
         Some(kept)
     }
 
@@ -170,12 +172,12 @@ impl<T: Real> Held<'_, T> {
         self.there_v
     }
 
-    fn factorise(&mut self, count: usize) -> Option<()> {
+    fn factorise(&mut self, count: usize, damping: T) -> Option<()> {
         let Self { patterns, factor, there_v, .. } = self;
         let (readings, factor) = (there_v.len(), &mut factor[..count * count]);
         let patterns = &patterns[..readings * count];
         T::products(patterns, patterns, readings, true, |i, j, product| factor[j * count + i] = product);
-        (0..count).for_each(|i| factor[i * count + i] += T::ONE);
+        (0..count).for_each(|i| factor[i * count + i] += damping);
         at_once(
             #[inline(always)]
             || factorise(factor, count),
@@ -198,7 +200,7 @@ impl<T: Real> Held<'_, T> {
         self.left.fill(T::ZERO);
     }
 
-    /// Notes a reading, of which so much is left, with its derivatives by the parameters (V).
+    /// Notes a reading, of which so much is left, with its derivatives by the parameters, all in noise.
     pub fn note(&mut self, index: usize, left: T, slope: &[T]) {
         let rows = self.slopes.chunks_exact_mut(self.left.len());
         rows.zip(slope).for_each(|(row, slope)| row[index] = *slope);
@@ -212,14 +214,14 @@ impl<T: Real> Held<'_, T> {
         &self.patterns[direction * readings..(direction + 1) * readings]
     }
 
-    /// Ends the look at contacts of so many parameters: products of what is left, and of the derivatives times `scale`, with the patterns are projected.
-    pub fn project(&mut self, count: usize, parameters: usize, scale: T) {
+    /// Ends the look at contacts of so many parameters: products of what is left, and of the derivatives, with the patterns are projected.
+    pub fn project(&mut self, count: usize, parameters: usize) {
         let Self { patterns, slopes, left, products: of_left, columns, factor, .. } = self;
         let readings = left.len();
         let patterns = &patterns[..readings * count];
         T::products(left, patterns, readings, false, |_, direction, product| of_left[direction] = product);
         T::products(&slopes[..readings * parameters], patterns, readings, false, |which, direction, product| {
-            columns[which * count + direction] = scale * product;
+            columns[which * count + direction] = product;
         });
         at_once(
             #[inline(always)]
@@ -230,6 +232,19 @@ impl<T: Real> Held<'_, T> {
                 }
             },
         );
+    }
+
+    /// Calls with products of the last look's derivatives, the lower triangle and few besides, and with those of what is left and them.
+    pub fn products(
+        &self,
+        parameters: usize,
+        squares: impl FnMut(usize, usize, T),
+        mut with_left: impl FnMut(usize, T),
+    ) {
+        let readings = self.left.len();
+        let slopes = &self.slopes[..readings * parameters];
+        T::products(slopes, slopes, readings, true, squares);
+        T::products(self.left, slopes, readings, false, |_, which, product| with_left(which, product));
     }
 
     /// What the last look leaves and its derivatives are in the directions of the patterns.
@@ -254,16 +269,15 @@ impl<T: Real> Held<'_, T> {
         self.left
     }
 
-    /// The part of a change's square, in noise, that steps of the detector could do as well; and its products with the derivatives but for what these do too, whose
-    /// volts are so much noise.
-    pub fn shared(&mut self, change: &[T], count: usize, scale: T, shared: &mut [T]) -> T {
+    /// The part of a change's square, in noise, that steps of the detector could do as well; and its products with the derivatives but for what these do too.
+    pub fn shared(&mut self, change: &[T], count: usize, shared: &mut [T]) -> T {
         let vector = &mut self.taken[..count];
         let readings = change.len();
         T::products(change, &self.patterns[..readings * count], readings, false, |_, direction, product| {
             vector[direction] = product;
         });
         T::products(change, &self.slopes[..readings * shared.len()], readings, false, |_, which, product| {
-            shared[which] = scale * product;
+            shared[which] = product;
         });
         forward(self.factor, count, vector);
         for (shared, column) in shared.iter_mut().zip(self.columns.chunks_exact(count.max(1))) {

@@ -289,7 +289,7 @@ pub(crate) fn summed(table: &Table<'_>, frame: &Frame<'_>, spots: &[Spot], devia
     let (mut circuit, mut normal) = (Circuit::EMPTY, Normal::EMPTY);
     let detector = Detector::described(table);
     assert!(circuit.solve(&detector, spots));
-    normal.sum_up(&detector, &circuit, frame, &Errors::of(frame, table), deviation, None);
+    normal.sum_up(&detector, &circuit, frame, &Errors::of(frame, table), deviation);
     normal
 }
 

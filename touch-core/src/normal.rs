@@ -2,6 +2,7 @@
 
 use crate::circuit::{Circuit, Loaded, TURNED};
 use crate::frame::{Errors, Frame, Says, left_v};
+use crate::head::Head;
 use crate::held::{Held, Projected};
 use crate::products::dot;
 use crate::real::Real;
@@ -50,7 +51,6 @@ impl<T: Real, const K: usize> Normal<T, K> {
     ///
     /// An error of a grounded pad's own impedance changes its row by `p`, so that the row's covariance is `v I + p p'`, whose inverse is
     /// `(I - p p' / (v + p'p)) / v` (Sherman and Morrison, 1950).
-    /// What is not known of the detector is in the covariance too where its patterns are held, of which so many count.
     pub fn sum_up(
         &mut self,
         detector: &Detector<'_, T>,
@@ -58,35 +58,19 @@ impl<T: Real, const K: usize> Normal<T, K> {
         frame: &Frame<'_, T>,
         errors: &Errors<T>,
         radius_deviation: T,
-        mut held: Option<(&mut Held<'_, T>, usize)>,
     ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         let (table, head, n) = (detector.table, detector.table.head(), detector.table.electrodes());
-        let noise_v = errors.variance_v2.sqrt();
-        if let Some((held, _)) = &mut held {
-            held.begin();
-        }
         let mut volts = [T::ZERO; MAX_ELECTRODES];
         for g in 0..n {
             circuit.row_v(detector, g, &mut volts);
             let (mut by_pad, mut left_by_pad, mut pad) = (Vector::<T, K>::ZERO, T::ZERO, T::ZERO);
             let slopes = RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m));
             for e in 0..n {
-                let index = g * n + e;
-                let read_v = detector.read_v(e, volts[e]);
-                let Some(left_v) = left_v(frame, index, T::of(head.full_v), read_v) else { continue };
-                let mut slope = Vector::<T, K>::ZERO;
-                for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-                    let pattern = Pattern::of(one, T::of(head.radius_m), |values| values[e]);
-                    slopes.add(circuit, k, &pattern, T::ONE - volts[e] / T::of(head.drive_v), &mut slope);
-                }
-                if let Some((held, _)) = &mut held {
-                    slope.iter_mut().for_each(|slope| *slope *= detector.gain(e, volts[e]));
-                    held.note(index, left_v / noise_v, &slope[..self.count]);
-                }
-                if frame.says_at(index) != Says::AtMost {
-                    let by_strength = slope.iter().skip(STRENGTH).step_by(PARAMETERS);
-                    self.said.iter_mut().zip(by_strength).for_each(|(said, slope)| *said += *slope * *slope);
+                let Some(left_v) = left_v(frame, g * n + e, T::of(head.full_v), volts[e]) else { continue };
+                let slope = slopes.of_reading(circuit, head, e, volts[e]);
+                if frame.says_at(g * n + e) != Says::AtMost {
+                    self.hear(&slope);
                 }
                 let by_pad_v = errors.pad_v(table, frame, g, e);
                 self.cost += left_v * left_v;
@@ -110,13 +94,51 @@ impl<T: Real, const K: usize> Normal<T, K> {
             }
         }
         self.weigh(T::ONE / errors.variance_v2);
-        if let Some((held, count)) = held {
-            held.project(count, self.count, T::ONE / noise_v);
-            let projected = held.projected(count);
-            self.if_known = self.least_if_known(&projected, radius_deviation);
-            self.leave_out(&projected);
-        }
         self.add_known(circuit, radius_deviation);
+    }
+
+    /// The same with what is not known of the detector, of which patterns are held, in the covariance.
+    pub fn sum_up_held(
+        &mut self,
+        detector: &Detector<'_, T>,
+        circuit: &Circuit<T, K>,
+        frame: &Frame<'_, T>,
+        noise_v: T,
+        radius_deviation: T,
+        (held, count): (&mut Held<'_, T>, usize),
+    ) {
+        *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
+        let (head, n) = (detector.table.head(), detector.table.electrodes());
+        held.begin();
+        let mut volts = [T::ZERO; MAX_ELECTRODES];
+        for g in 0..n {
+            circuit.row_v(detector, g, &mut volts);
+            let slopes = RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m));
+            for e in 0..n {
+                let (index, read_v) = (g * n + e, detector.read_v(e, volts[e]));
+                let Some(left_v) = left_v(frame, index, T::of(head.full_v), read_v) else { continue };
+                let mut slope = slopes.of_reading(circuit, head, e, volts[e]);
+                let scale = detector.gain(e, volts[e]) / noise_v;
+                slope[..self.count].iter_mut().for_each(|slope| *slope *= scale);
+                held.note(index, left_v / noise_v, &slope[..self.count]);
+                if frame.says_at(index) != Says::AtMost {
+                    self.hear(&slope);
+                }
+            }
+        }
+        held.project(count, self.count);
+        self.cost = dot(held.left(), held.left());
+        held.products(self.count, |i, j, product| self.matrix[i][j] = product, |i, product| self.pull[i] = product);
+        let projected = held.projected(count);
+        self.if_known = self.least_if_known(&projected, radius_deviation);
+        self.leave_out(&projected);
+        self.add_known(circuit, radius_deviation);
+    }
+
+    /// Takes what a reading says of strengths, of which it has these derivatives.
+    fn hear(&mut self, slope: &Vector<T, K>) {
+        let by_strength = slope.0.iter().map(|of_one| of_one[STRENGTH]).take(self.count / PARAMETERS);
+        self.said.iter_mut().zip(by_strength).for_each(|(said, slope)| *said += slope * slope);
     }
 
     /// Takes what steps of the detector could do as well from all sums.
@@ -301,13 +323,18 @@ impl<T: Real, const K: usize> RowSlopes<T, K> {
         all
     }
 
-    /// Adds the derivatives of a reading by the parameters of a contact, of which the electrode has `pattern`; `of_load` is what of the drive is not predicted at it.
-    fn add(&self, circuit: &Circuit<T, K>, k: usize, pattern: &Pattern<T>, of_load: T, slope: &mut Vector<T, K>) {
-        let first = PARAMETERS * k;
-        let changes_ohm = pattern.changes_ohm(&self.own[k], &circuit.loaded[k]);
-        for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
-            slope[first + i] += self.per_ohm * (change_ohm - of_load * self.own_ohm[first + i]);
+    /// Derivatives of an electrode's reading, which is so many volts there, by the parameters (V).
+    fn of_reading(&self, circuit: &Circuit<T, K>, head: &Head, e: usize, volts: T) -> Vector<T, K> {
+        let of_load = T::ONE - volts / T::of(head.drive_v);
+        let mut slope = Vector::ZERO;
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            let pattern = Pattern::of(one, T::of(head.radius_m), |values| values[e]);
+            let changes_ohm = pattern.changes_ohm(&self.own[k], one);
+            for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
+                slope.0[k][i] = self.per_ohm * (change_ohm - of_load * self.own_ohm.0[k][i]);
+            }
         }
+        slope
     }
 }
 

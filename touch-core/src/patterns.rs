@@ -12,9 +12,9 @@
 use crate::circuit::Circuit;
 use crate::fields::Stencil;
 use crate::lanes::at_once;
+use crate::products::add;
 use crate::real::Real;
 use crate::table::MAX_ELECTRODES;
-use crate::products::add;
 use crate::unknown::{Change, Detector, Fields, Knots, Unknown, of_pair, pairs};
 
 /// The readings of contacts, with what their changes need.

@@ -8,7 +8,7 @@ use crate::births::Births;
 use crate::circuit::Circuit;
 use crate::evidence::{known, ln_volume};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
-use crate::frame::{Errors, left_v};
+use crate::frame::left_v;
 use crate::held::{Held, Kept, Parts, Room};
 use crate::normal::Normal;
 use crate::real::Real;
@@ -19,9 +19,11 @@ use crate::unknown::{Detector, Layout, Unknown};
 
 /// Steps of contacts in a round.
 const INNER: u8 = 2;
-/// Shares of the way that are tried one after the other, each of the last; and the least.
-const SHORTER: f32 = 0.4;
-const SHORTEST: f32 = 0.02;
+/// Share of the way that is tried where the readings do not agree to all of it.
+const SHORTER: f32 = 0.3;
+/// Weights of what a step of the detector costs besides what it is known by (Marquardt, 1963): how they change, and the largest.
+const DAMPING_STEP: f32 = 10.0;
+const MOST_DAMPING: f32 = 1e4;
 /// What is left over noise (in its deviations) up to which it is noise, the least share of what was taken for noise in the round before, and how much less than that is
 /// worth another round.
 const NOISE: f32 = 1.3;
@@ -36,13 +38,16 @@ pub(crate) struct OnUnknown<T, const D: usize> {
     /// Squares of what is left of the readings, in true noise, and of all that was known before.
     left: T,
     prior: T,
+    /// Weight of the squares of what the detector's next step is, where that of those of its steps from the description is one.
+    pub damping: T,
     /// Directions whose patterns are held, and whether they are those of the scene.
     pub kept: Kept<D>,
     pub is_held: bool,
 }
 
 impl<T: Real, const D: usize> OnUnknown<T, D> {
-    pub const NONE: Self = Self { tau: T::ONE, left: T::ZERO, prior: T::ZERO, kept: Kept::NONE, is_held: false };
+    pub const NONE: Self =
+        Self { tau: T::ONE, left: T::ZERO, prior: T::ZERO, damping: T::ONE, kept: Kept::NONE, is_held: false };
 
     fn objective(&self) -> T {
         self.left / (self.tau * self.tau) + self.prior
@@ -113,14 +118,30 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             return Went::ToEnd(self.end_round(&mut on));
         }
         let before = self.on.objective();
-        let is_better = self.go_towards(&to, &mut on);
+        let share = self.go_towards(&to, &mut on);
+        let is_better = share > T::ZERO;
         self.on.is_held &= !is_better;
         let is_less_noise = self.take_noise(task.readings());
         let is_worth_it = is_better && before - self.on.objective() >= self.worth;
-        match self.steps > 0 && (is_less_noise || is_worth_it) {
+        let may_go_on = self.damp(share) || is_less_noise || is_worth_it;
+        match self.steps > 0 && may_go_on {
             true => Went::On,
             false => Went::ToEnd(self.end_round(&mut on)),
         }
+    }
+
+    /// Makes the detector's next step shorter or longer, as the readings agreed to so much of the last one; whether that is a reason for another one.
+    fn damp(&mut self, share: T) -> bool {
+        let before = self.on.damping;
+        let most = T::of(MOST_DAMPING);
+        self.on.damping = match share {
+            share if share == T::ONE => (before / T::of(DAMPING_STEP)).max(T::ONE),
+            share if share > T::ZERO => before,
+            _ => (before * T::of(DAMPING_STEP)).min(most),
+        };
+        let has_changed = self.on.damping != before;
+        self.on.is_held &= !has_changed;
+        has_changed
     }
 
     /// Takes the places where one more contact would explain most of what those of the last fit leave among the best.
@@ -158,12 +179,12 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     fn step_contacts(&mut self, on: &mut On<'_, '_, T, K>, work: &mut Working<'_, K>) -> Option<Scene<T, K, D>> {
         let Task { table, frame, errors, .. } = on.task;
         let (unknown, full_v) = (on.unknown, T::of(table.head().full_v));
-        let errors = Errors { variance_v2: errors.variance_v2 * self.on.tau * self.on.tau, ..*errors };
+        let noise_v = self.on.tau * errors.variance_v2.sqrt();
         let mut at = self.scene;
         let (detector, circuit, held) = on.solved(&at)?;
         if !self.on.is_held {
             let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
-            self.on.kept = held.hold(&detector, unknown, circuit, errors.variance_v2.sqrt(), says)?;
+            self.on.kept = held.hold(&detector, unknown, circuit, noise_v, self.on.damping, says)?;
             self.on.is_held = true;
         }
         let kept = self.on.kept;
@@ -173,7 +194,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             if !circuit.solve(&detector, scene.spots()) {
                 return false;
             }
-            normal.sum_up(&detector, circuit, frame, &errors, radius_deviation, Some((held, kept.count)));
+            normal.sum_up_held(&detector, circuit, frame, noise_v, radius_deviation, (held, kept.count));
             work.worked_out(scene.count);
             normal.objective().is_finite()
         };
@@ -214,21 +235,19 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         Some(at)
     }
 
-    /// Goes as far on the way to a scene as the readings agree to; `false` if they agree to nothing.
-    fn go_towards(&mut self, to: &Scene<T, K, D>, on: &mut On<'_, '_, T, K>) -> bool {
-        let mut share = T::ONE;
-        while share > T::of(SHORTEST) {
+    /// Goes as far on the way to a scene as the readings agree to: which share of it.
+    fn go_towards(&mut self, to: &Scene<T, K, D>, on: &mut On<'_, '_, T, K>) -> T {
+        for share in [T::ONE, T::of(SHORTER)] {
             let there = self.scene.towards(to, share);
             if let Some(left) = on.left(&there) {
                 let new = OnUnknown { left, prior: prior(&there, self.radius_deviation), ..self.on };
                 if new.objective() < self.on.objective() {
                     (self.scene, self.on) = (there, new);
-                    return true;
+                    return share;
                 }
             }
-            share *= T::of(SHORTER);
         }
-        false
+        T::ZERO
     }
 
     /// Takes as much for noise as is left; whether that is much less than before.
@@ -246,11 +265,17 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     /// The fit, looked at where it ended with the patterns that are held.
     fn end_round(&mut self, on: &mut On<'_, '_, T, K>) -> Option<Fit<T, K, D>> {
         let Task { table, frame, errors, .. } = on.task;
-        let errors = Errors { variance_v2: errors.variance_v2 * self.on.tau * self.on.tau, ..*errors };
-        let kept = self.on.kept;
+        let noise_v = self.on.tau * errors.variance_v2.sqrt();
+        let (unknown, full_v) = (on.unknown, T::of(table.head().full_v));
         let (detector, circuit, held) = on.solved(&self.scene)?;
+        if self.on.damping != T::ONE {
+            self.on.damping = T::ONE;
+            let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
+            self.on.kept = held.hold(&detector, unknown, circuit, noise_v, T::ONE, says)?;
+        }
+        let kept = self.on.kept;
         held.set_state(&kept, &self.scene.steps);
-        self.normal.sum_up(&detector, circuit, frame, &errors, self.radius_deviation, Some((held, kept.count)));
+        self.normal.sum_up_held(&detector, circuit, frame, noise_v, self.radius_deviation, (held, kept.count));
         // Near enough to hold for what comes next at this scene.
         self.on.is_held = true;
         let steps: T = self.scene.steps.iter().map(|step| *step * *step).sum();

@@ -330,7 +330,9 @@ impl<'a, T: Real> Detector<'a, T> {
 
     /// What a channel makes of a small change of a voltage.
     pub fn gain(&self, e: usize, volts: T) -> T {
-        self.moved.as_ref().map_or(T::ONE, |(unknown, moved)| moved.gains[e] + moved.bows_v[e] * unknown.bow(e, volts)[1])
+        self.moved
+            .as_ref()
+            .map_or(T::ONE, |(unknown, moved)| moved.gains[e] + moved.bows_v[e] * unknown.bow(e, volts)[1])
     }
 
     /// The part of the field between places that goes by their distance (m): its value (ohm), and its derivative by that (ohm/m).

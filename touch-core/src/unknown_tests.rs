@@ -155,7 +155,8 @@ fn patterns_are_differences() {
                     assert!(circuit.solve(detector, &spots));
                     let (mut there_v, mut all) = (std::vec![0.0; N * N], std::vec![0.0; N * N * DIRECTIONS]);
                     there_v.chunks_exact_mut(N).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
-                    crate::patterns::Patterns::new(detector, unknown, &circuit, &there_v).write(&mut all, &mut std::vec![0.0; N * N]);
+                    crate::patterns::Patterns::new(detector, unknown, &circuit, &there_v)
+                        .write(&mut all, &mut std::vec![0.0; N * N]);
                     all[direction * N * N..(direction + 1) * N * N].to_vec()
                 });
                 let largest = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));
@@ -182,11 +183,11 @@ fn the_sum_of_squares_is_that_of_the_posteriors_mean() {
         with_held(unknown, &table, |held| {
             let mut circuit = Circuit::<f64, 3>::EMPTY;
             assert!(circuit.solve(detector, spots));
-            let kept: Kept<DIRECTIONS> = held.hold(detector, unknown, &circuit, noise_v, |_, _| true).unwrap();
+            let kept: Kept<DIRECTIONS> = held.hold(detector, unknown, &circuit, noise_v, 1.0, |_, _| true).unwrap();
             assert_eq!(kept.count, DIRECTIONS);
             held.set_state(&kept, &[0.0; DIRECTIONS]);
             let mut normal = Normal::EMPTY;
-            normal.sum_up(detector, &circuit, &frame, &errors, f64::from(ANY_RADIUS), Some((held, kept.count)));
+            normal.sum_up_held(detector, &circuit, &frame, noise_v, f64::from(ANY_RADIUS), (held, kept.count));
             held.take(kept.count);
             let mut mean = [0.0; DIRECTIONS];
             held.posterior(&kept, &mut mean);
