@@ -118,30 +118,31 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             return Went::ToEnd(self.end_round(&mut on));
         }
         let before = self.on.objective();
+        let promised = before - self.normal.objective();
+        if promised < self.worth {
+            return Went::ToEnd(self.end_round(&mut on));
+        }
         let share = self.go_towards(&to, &mut on);
-        let is_better = share > T::ZERO;
-        self.on.is_held &= !is_better;
+        self.on.is_held &= share == T::ZERO;
         let is_less_noise = self.take_noise(task.readings());
-        let is_worth_it = is_better && before - self.on.objective() >= self.worth;
-        let may_go_on = self.damp(share) || is_less_noise || is_worth_it;
-        match self.steps > 0 && may_go_on {
+        let is_worth_it = before - self.on.objective() >= self.worth;
+        let is_shorter = self.damp(share);
+        match self.steps > 0 && (is_less_noise || is_worth_it || is_shorter) {
             true => Went::On,
             false => Went::ToEnd(self.end_round(&mut on)),
         }
     }
 
-    /// Makes the detector's next step shorter or longer, as the readings agreed to so much of the last one; whether that is a reason for another one.
+    /// Makes the detector's next step shorter or longer, as the readings agreed to so much of the last one; whether it is shorter.
     fn damp(&mut self, share: T) -> bool {
         let before = self.on.damping;
-        let most = T::of(MOST_DAMPING);
-        self.on.damping = match share {
-            share if share == T::ONE => (before / T::of(DAMPING_STEP)).max(T::ONE),
-            share if share > T::ZERO => before,
-            _ => (before * T::of(DAMPING_STEP)).min(most),
-        };
-        let has_changed = self.on.damping != before;
-        self.on.is_held &= !has_changed;
-        has_changed
+        if share == T::ONE {
+            self.on.damping = (before / T::of(DAMPING_STEP)).max(T::ONE);
+        } else if share == T::ZERO {
+            self.on.damping = (before * T::of(DAMPING_STEP)).min(T::of(MOST_DAMPING));
+        }
+        self.on.is_held &= self.on.damping == before;
+        self.on.damping > before
     }
 
     /// Takes the places where one more contact would explain most of what those of the last fit leave among the best.
