@@ -22,14 +22,14 @@ use crate::vector::PARAMETERS;
 /// Square of a pattern, in noise, below which its direction is left out: it changes a sum of squares by no more.
 const LEAST_SQUARE: f32 = 0.3;
 
-/// Room for a detector that is not known, as much as [`Room::numbers`] and [`Unknown::tables`] say. What is in it before does not matter; it is to be given again with the
+/// Room for a detector that is not known, as much as [`Room::numbers`] and [`Room::floats`] say. What is in it before does not matter; it is to be given again with the
 /// next piece of work.
 #[derive(Debug)]
 pub struct Room<'m, T> {
     /// Numbers.
     pub numbers: &'m mut [T],
-    /// Shares of the tables.
-    pub shares: &'m mut [f32],
+    /// Numbers that take no more digits.
+    pub floats: &'m mut [f32],
 }
 
 /// Parts of the room.
@@ -47,6 +47,11 @@ impl<T: Real> Room<'_, T> {
         Layout::of(table, unknown).numbers() + counts(table, unknown, contacts).iter().sum::<usize>()
     }
 
+    /// How many floats there are to be for up to `contacts` contacts.
+    pub fn floats(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> usize {
+        unknown.tables + contacts * unknown.of_place(table.electrodes())
+    }
+
     pub(crate) fn parts(&mut self, table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> Parts<'_, T> {
         let (moved, mut rest) = self.numbers.split_at_mut(Layout::of(table, unknown).numbers());
         let [there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left] =
@@ -55,8 +60,10 @@ impl<T: Real> Room<'_, T> {
                 rest = after;
                 part
             });
-        let held = Held { there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left };
-        Parts { moved, shares: &mut *self.shares, held }
+        let (shares, fields) = self.floats.split_at_mut(unknown.tables);
+        let fields = &mut fields[..contacts * unknown.of_place(table.electrodes())];
+        let held = Held { fields, there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left };
+        Parts { moved, shares, held }
     }
 }
 
@@ -80,6 +87,8 @@ fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 
 /// Patterns that are held.
 #[derive(Debug)]
 pub(crate) struct Held<'m, T> {
+    /// What each table changes at contacts.
+    fields: &'m mut [f32],
     there_v: &'m mut [T],
     /// In noise: a row of readings for each direction that counts.
     patterns: &'m mut [T],
@@ -138,7 +147,7 @@ impl<T: Real> Held<'_, T> {
         says: impl Fn(usize, T) -> bool,
     ) -> Option<Kept<D>> {
         self.note_there(detector, circuit);
-        Patterns::new(detector, unknown, circuit, self.there_v).write(self.patterns, self.left);
+        Patterns::new(detector, unknown, circuit, self.there_v, self.fields).write(self.patterns, self.left);
         let readings = self.there_v.len();
         for (index, scale) in self.left.iter_mut().enumerate() {
             let read_v = detector.read_v(index % detector.table.electrodes(), self.there_v[index]);

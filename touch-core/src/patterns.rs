@@ -22,21 +22,30 @@ pub(crate) struct Patterns<'a, T, const K: usize> {
     detector: &'a Detector<'a, T>,
     unknown: &'a Unknown<'a>,
     circuit: &'a Circuit<T, K>,
-    stencils: [Option<Stencil<T>>; K],
+    /// What each table changes at contacts.
+    fields: &'a [f32],
     /// What is there to be read (V), in the readings' order.
     there_v: &'a [T],
 }
 
 impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
-    /// Of contacts that are solved on a detector; `there_v` is what is there to be read (V).
+    /// Of contacts that are solved on a detector; `there_v` is what is there to be read (V), and `fields` room for what tables change.
     pub fn new(
         detector: &'a Detector<'a, T>,
         unknown: &'a Unknown<'a>,
         circuit: &'a Circuit<T, K>,
         there_v: &'a [T],
+        fields: &'a mut [f32],
     ) -> Self {
-        let stencil = |k: usize| (k < circuit.count).then(|| Stencil::of(detector.table, circuit.loaded[k].spot.at_m));
-        Self { detector, unknown, circuit, stencils: core::array::from_fn(stencil), there_v }
+        let (table, n) = (detector.table, detector.table.electrodes());
+        let rows = fields.chunks_exact_mut(unknown.of_place(n).max(1));
+        for (one, row) in circuit.loaded.iter().zip(rows).take(circuit.count) {
+            at_once(
+                #[inline(always)]
+                || unknown.all_at(n, &Stencil::of(table, one.spot.at_m), row),
+            );
+        }
+        Self { detector, unknown, circuit, fields, there_v }
     }
 
     /// Changes of all readings (V) by one deviation in each direction: a row of readings for each; `gains` is room for so many.
@@ -74,8 +83,8 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         let (circuit, n) = (self.circuit, self.detector.table.electrodes());
         let loaded = &circuit.loaded[..circuit.count];
         let mut fields = [Fields::NONE; K];
-        for (stencil, fields) in self.stencils.iter().flatten().zip(&mut fields) {
-            self.unknown.fields_at(n, which, stencil, fields);
+        for (all, fields) in self.fields.chunks_exact(self.unknown.of_place(n)).zip(&mut fields).take(circuit.count) {
+            self.unknown.of_table(n, which, all, fields);
         }
         // What drives currents besides those that flow: `dU - dN U`; and for the fields, whose change is there twice, half of the latter.
         let mut driven = fields.map(|fields| fields.value);
@@ -94,19 +103,19 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         let couples = self.couples_ohm_per_m(&fields, &driven);
         let pads_ohm = &self.unknown.pads_ohm[which * pairs(n)..(which + 1) * pairs(n)];
         for g in 0..n {
-            let mut row = [T::ZERO; MAX_ELECTRODES];
-            for (e, ohm) in row.iter_mut().enumerate().take(n) {
+            let row = &mut [T::ZERO; MAX_ELECTRODES][..n];
+            for (e, ohm) in row.iter_mut().enumerate() {
                 *ohm = T::of(of_pair(pads_ohm, e, g));
             }
             for ((one, fields), couples) in loaded.iter().zip(&halved).zip(&couples) {
-                add(&mut row, -one.currents[g], fields);
-                add(&mut row, -fields[g], &one.currents);
+                add(row, -one.currents[g], fields);
+                add(row, -fields[g], &one.currents);
                 for (driving, couple) in one.driving_ohm_per_m.iter().zip(couples) {
-                    add(&mut row, -driving[g], couple);
-                    add(&mut row, -couple[g], driving);
+                    add(row, -driving[g], couple);
+                    add(row, -couple[g], driving);
                 }
             }
-            self.add_row(g, share, &row, &mut volts[g * n..(g + 1) * n]);
+            self.add_row(g, share, row, &mut volts[g * n..(g + 1) * n]);
         }
     }
 

@@ -134,24 +134,34 @@ impl Unknown<'_> {
         }
     }
 
-    /// What a table changes at a place.
+    /// How many numbers it takes what all tables change at a place.
+    pub(crate) fn of_place(&self, electrodes: usize) -> usize {
+        3 * self.tables * (electrodes + 1)
+    }
+
+    /// What all tables change at a place: fields, and their derivatives along x and y.
     #[inline(always)]
-    pub(crate) fn fields_at<T: Real>(&self, electrodes: usize, which: usize, stencil: &Stencil<T>, at: &mut Fields<T>) {
-        let first = which * (electrodes + 1);
-        let mut sums = [[0.0f32; MAX_ELECTRODES + 1]; 3];
+    pub(crate) fn all_at<T: Real>(&self, electrodes: usize, stencil: &Stencil<T>, all: &mut [f32]) {
+        let count = self.tables * (electrodes + 1);
+        all.fill(0.0);
         for (index, node) in stencil.nodes.into_iter().enumerate() {
-            let of_table = self.node(node, electrodes).get(first..first + electrodes + 1).unwrap_or(&[]);
-            for (sums, weights) in sums.iter_mut().zip(&stencil.weights) {
-                add(sums, weights[index].to_f32().unwrap_or(0.0), of_table);
+            let changes = self.node(node, electrodes);
+            for (sums, weights) in all.chunks_exact_mut(count.max(1)).zip(&stencil.weights) {
+                add(sums, weights[index].to_f32().unwrap_or(0.0), changes);
             }
         }
-        let [value, slope @ ..] = &sums;
-        at.own_ohm = sums.each_ref().map(|sums| T::of(sums[electrodes]));
-        let take = |to: &mut [T; MAX_ELECTRODES], from: &[f32]| {
+    }
+
+    /// Those of a table.
+    #[inline(always)]
+    pub(crate) fn of_table<T: Real>(&self, electrodes: usize, which: usize, all: &[f32], at: &mut Fields<T>) {
+        let count = electrodes + 1;
+        let mut parts = all.chunks_exact(self.tables * count).map(|all| &all[which * count..(which + 1) * count]);
+        let [value, x, y] = core::array::from_fn(|_| parts.next().unwrap_or(&[]));
+        for (to, from) in [&mut at.value].into_iter().chain(&mut at.slope).zip([value, x, y]) {
             to.iter_mut().zip(from).take(electrodes).for_each(|(to, from)| *to = T::of(*from));
-        };
-        take(&mut at.value, value);
-        at.slope.iter_mut().zip(slope).for_each(|(to, from)| take(to, from));
+        }
+        at.own_ohm = [value, x, y].map(|from| from.last().map_or(T::ZERO, |ohm| T::of(*ohm)));
     }
 }
 

@@ -130,7 +130,8 @@ const STEPS: [f64; DIRECTIONS] = [0.8, -1.1, 0.5, -0.7, 1.2, 0.4, -0.9, 0.6];
 /// The parts of a room that what is held needs.
 fn with_held<R>(unknown: &Unknown<'_>, table: &Table<'_>, function: impl FnOnce(&mut Held<'_, f64>) -> R) -> R {
     let mut numbers = std::vec![0.0; Room::<f64>::numbers(table, unknown, 3)];
-    let mut room = Room { numbers: &mut numbers, shares: &mut [0.0; TABLES] };
+    let mut floats = std::vec![0.0; Room::<f64>::floats(table, unknown, 3)];
+    let mut room = Room { numbers: &mut numbers, floats: &mut floats };
     function(&mut room.parts(table, unknown, 3).held)
 }
 
@@ -155,7 +156,8 @@ fn patterns_are_differences() {
                     assert!(circuit.solve(detector, &spots));
                     let (mut there_v, mut all) = (std::vec![0.0; N * N], std::vec![0.0; N * N * DIRECTIONS]);
                     there_v.chunks_exact_mut(N).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
-                    crate::patterns::Patterns::new(detector, unknown, &circuit, &there_v)
+                    let mut fields = std::vec![0.0; Room::<f64>::floats(&table, unknown, 3)];
+                    crate::patterns::Patterns::new(detector, unknown, &circuit, &there_v, &mut fields)
                         .write(&mut all, &mut std::vec![0.0; N * N]);
                     all[direction * N * N..(direction + 1) * N * N].to_vec()
                 });
@@ -221,11 +223,11 @@ fn contacts_are_found_with_the_detector_that_they_are_on() {
     let made_up = MadeUp::new(&table);
     let unknown = made_up.unknown();
     let mut numbers = std::vec![0.0; Room::<f64>::numbers(&table, &unknown, 3)];
-    let mut shares = [0.0; TABLES];
     for spots in scenes() {
         let read = read_v(&table, &made_up, STEPS, &spots);
         let frame = Frame::of_volts(&read);
-        let mut room = Room { numbers: &mut numbers, shares: &mut shares };
+        let mut floats = std::vec![0.0; Room::<f64>::floats(&table, &unknown, 3)];
+        let mut room = Room { numbers: &mut numbers, floats: &mut floats };
         let mut solver = Solver::<f64, 3, DIRECTIONS>::default();
         let answer = solver.solve_unknown(&table, &unknown, &mut room, &frame).unwrap();
         assert_eq!(answer.contacts().len(), spots.len(), "{answer:?}");

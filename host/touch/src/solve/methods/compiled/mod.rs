@@ -45,7 +45,7 @@ pub struct Compiled {
     changes: Option<Changes>,
     /// Where the core works on them.
     numbers: Vec<f64>,
-    shares: Vec<f32>,
+    floats: Vec<f32>,
 }
 
 impl Compiled {
@@ -65,7 +65,7 @@ impl Compiled {
         let table = Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
         let (electrodes, drive_v) = (detector.electrodes.len(), detector.drive_v);
         let changes = Changes::of(problem, &fitted, threads::cores()).map_err(wrong)?;
-        let (mut numbers, mut shares) = (Vec::new(), Vec::new());
+        let (mut numbers, mut floats) = (Vec::new(), Vec::new());
         if let Some(changes) = &changes {
             let unknown = changes.unknown();
             if unknown.directions.len() > MOST_DIRECTIONS {
@@ -75,9 +75,9 @@ impl Compiled {
                 )));
             }
             numbers = vec![0.0; Room::<f64>::numbers(&table, &unknown, MOST_CONTACTS)];
-            shares = vec![0.0; unknown.tables];
+            floats = vec![0.0; Room::<f64>::floats(&table, &unknown, MOST_CONTACTS)];
         }
-        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Box::default(), changes, numbers, shares })
+        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Box::default(), changes, numbers, floats })
     }
 
     /// A reading as a board can give it (V): none is far beyond its drive.
@@ -102,7 +102,7 @@ impl Solver for Compiled {
         let frame = Frame::new(&volts, &says);
         let answer = match &self.changes {
             Some(changes) => {
-                let mut room = Room { numbers: &mut self.numbers, shares: &mut self.shares };
+                let mut room = Room { numbers: &mut self.numbers, floats: &mut self.floats };
                 self.core.solve_unknown(&table, &changes.unknown(), &mut room, &frame)
             }
             None => self.core.solve(&table, &frame),
