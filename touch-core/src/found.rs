@@ -322,10 +322,10 @@ fn a_search_grows_exchanges_and_reduces() {
     assert_eq!(anew, 2, "{asked:?}");
     // One of which little is known is left out where the other does as well.
     let alike = |scene: &Scene, _| {
-        Some(fit(scene.count, if scene.count == 1 { 241.0 } else { 230.0 }, 500.0)).filter(|fit| fit.scene.count > 0)
+        Some(fit(scene.count, if scene.count == 1 { 241.0 } else { 230.0 }, 100.0)).filter(|fit| fit.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(Some(fit(2, 230.0, 500.0)), None, 240.0);
+    let wants = search.begin(Some(fit(2, 230.0, 100.0)), None, 240.0);
     let (asked, found) = run(&mut search, wants, alike, |_| 0.0);
     assert_eq!((found.unwrap().scene.count, &asked[1..]), (1, &[(1, any), (1, any)][..]));
     // One that readings do not speak for goes, and with the last of them all.

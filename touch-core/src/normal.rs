@@ -218,13 +218,16 @@ impl<T: Real, const K: usize> Normal<T, K> {
     }
 
     /// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that
-    /// of the derivative by its logarithm, or what others leave of that. Places that they do not tell are known as these weights say.
+    /// of the derivative by its logarithm, or what others leave of that. Where it is does not count: that one is there may be told where its place is not. Places are
+    /// known as these weights say.
     pub fn information(&self, weights: [T; PARAMETERS]) -> [T; K] {
         let covariance = self.covariance(weights);
         core::array::from_fn(|k| {
-            let strength = PARAMETERS * k + STRENGTH;
-            let left = covariance.as_ref().map_or(T::infinity(), |all| T::ONE / all[strength][strength]);
-            self.matrix[strength][strength].min(left).min(self.said[k])
+            let first = PARAMETERS * k;
+            let left = covariance.as_ref().map_or(T::infinity(), |all| {
+                inverse_diagonal(core::array::from_fn(|i| core::array::from_fn(|j| all[first + i][first + j])))
+            });
+            self.matrix[first + STRENGTH][first + STRENGTH].min(left).min(self.said[k])
         })
     }
 
@@ -245,6 +248,18 @@ impl<T: Real, const K: usize> Normal<T, K> {
         }
         Some(all)
     }
+}
+
+/// The element of the inverse of a contact's covariance that is that of its strength: one over the variance if the rest were known.
+fn inverse_diagonal<T: Real>(mut covariance: [[T; PARAMETERS]; PARAMETERS]) -> T {
+    for pivot in (0..PARAMETERS).filter(|pivot| *pivot != STRENGTH) {
+        let row = covariance[pivot];
+        for other in covariance.iter_mut().enumerate().filter(|(i, _)| *i != pivot).map(|(_, other)| other) {
+            let factor = other[pivot] / row[pivot];
+            other.iter_mut().zip(row).for_each(|(value, of_pivot)| *value -= factor * of_pivot);
+        }
+    }
+    T::ONE / covariance[STRENGTH][STRENGTH].max(T::min_positive_value())
 }
 
 /// What the derivatives by a contact's parameters need of an electrode: numbers that are linear in the electrodes, so that a sum over these will do too.
