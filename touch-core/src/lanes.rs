@@ -1,9 +1,8 @@
 //! More numbers at once, where a processor can.
 
-#[cfg(not(feature = "wide"))]
-use crate::products::dot;
 use crate::products::{ROWS, each_with_each};
-use crate::real::Real;
+#[cfg(not(feature = "wide"))]
+use crate::{products::dot, real::Real};
 
 /// Calls a function that is inlined with all that it calls, as the processor at hand can do it best.
 #[inline(always)]
