@@ -13,7 +13,8 @@ use crate::scan::{CANDIDATES, Candidates, no_candidates};
 pub(crate) const FIRST_GAIN: f32 = 60.0;
 /// Squares that are left, in those of a misfit, above which more contacts are there for sure.
 const MOST_OF: f32 = 8.0;
-/// What the readings say for a contact whose strength they tell to 3 %: that one is there (squared deviations, one over the square of that).
+/// What the readings say for a contact whose strength they tell to 7 %: that one is there (squared deviations, one over the square of that). With 1000 searches on detectors
+/// that are not known take a fifth longer and find the same in 300 scenes.
 const SURE: f32 = 200.0;
 /// By how much a contact that was looked for anew has to be better (squared deviations): of two that are alike the first stays.
 const BETTER: f32 = 7.0;
