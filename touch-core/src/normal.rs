@@ -31,7 +31,7 @@ pub(crate) struct Normal<T, const K: usize> {
     /// The same of what was known of radii before.
     pub known: T,
     /// Diagonal of `J' W J` for each contact's strength by the readings that can speak for one: of a bound from above that it comes up to none does.
-    said: [T; K],
+    pub said: [T; K],
     /// What contacts would leave in the linear theory if the detector were as its table says.
     pub if_known: T,
 }

@@ -5,6 +5,7 @@ use std::vec::Vec;
 use crate::circuit::{Circuit, Spot};
 use crate::frame::{Errors, Frame};
 use crate::held::{Held, Kept};
+use crate::lanes::Lanes;
 use crate::normal::{ANY_RADIUS, Normal};
 use crate::samples::{CELLS, fields_ohm, grid_m, table};
 use crate::solver::Solver;
@@ -181,38 +182,78 @@ fn the_sum_of_squares_is_that_of_the_posteriors_mean() {
     let mut errors = Errors::of(&frame, &table);
     errors.pads.fill(0.0);
     let noise_v = errors.variance_v2.sqrt();
-    on_moved(&table, &made_up, [0.0; DIRECTIONS], |detector, unknown| {
-        with_held(unknown, &table, |held| {
-            let mut circuit = Circuit::<f64, 3>::EMPTY;
-            assert!(circuit.solve(detector, spots));
-            let kept: Kept<DIRECTIONS> = held.hold(detector, unknown, &circuit, noise_v, 1.0, |_, _| true).unwrap();
-            assert_eq!(kept.count, DIRECTIONS);
-            held.set_state(&kept, &[0.0; DIRECTIONS]);
-            let mut normal = Normal::EMPTY;
-            normal.sum_up_held(detector, &circuit, &frame, noise_v, f64::from(ANY_RADIUS), (held, kept.count));
-            held.take(kept.count);
-            let mut mean = [0.0; DIRECTIONS];
-            held.posterior(&kept, &mut mean);
-            let patterns: Vec<Vec<f64>> = (0..DIRECTIONS).map(|direction| held.pattern(direction).to_vec()).collect();
-            let predicted = read_v(&table, &made_up, [0.0; DIRECTIONS], spots);
-            let left = |steps: &[f64; DIRECTIONS]| {
-                let of_reading = |index: usize| {
-                    let by_steps: f64 = patterns.iter().zip(steps).map(|(pattern, s)| pattern[index] * s).sum();
-                    ((read[index] - predicted[index]) / noise_v - by_steps).powi(2)
+    // At the description, and on the way.
+    for at in [0.0, 0.3].map(|share| STEPS.map(|step| share * step)) {
+        on_moved(&table, &made_up, at, |detector, unknown| {
+            with_held(unknown, &table, |held| {
+                let mut circuit = Circuit::<f64, 3>::EMPTY;
+                assert!(circuit.solve(detector, spots));
+                let kept: Kept<DIRECTIONS> = held.hold(detector, unknown, &circuit, noise_v, 1.0, |_, _| true).unwrap();
+                assert_eq!(kept.count, DIRECTIONS);
+                held.set_state(&kept, &at);
+                let mut normal = Normal::EMPTY;
+                normal.sum_up_held(detector, &circuit, &frame, noise_v, f64::from(ANY_RADIUS), (held, kept.count));
+                held.take(kept.count);
+                let mut mean = at;
+                held.posterior(&kept, &mut mean);
+                let patterns: Vec<Vec<f64>> = (0..DIRECTIONS).map(|k| held.pattern(k).to_vec()).collect();
+                let predicted = read_v(&table, &made_up, at, spots);
+                let left = |steps: &[f64; DIRECTIONS]| {
+                    let of_reading = |index: usize| {
+                        let further = steps.iter().zip(&at).map(|(step, at)| step - at);
+                        let by_steps: f64 = patterns.iter().zip(further).map(|(pattern, s)| pattern[index] * s).sum();
+                        ((read[index] - predicted[index]) / noise_v - by_steps).powi(2)
+                    };
+                    (0..N * N).map(of_reading).sum::<f64>() + steps.iter().map(|s| s * s).sum::<f64>()
                 };
-                (0..N * N).map(of_reading).sum::<f64>() + steps.iter().map(|s| s * s).sum::<f64>()
-            };
-            let least = left(&mean);
-            assert!((normal.cost - least).abs() < 1e-6 * least, "{} {least}", normal.cost);
-            for direction in 0..DIRECTIONS {
-                for way in [-0.1, 0.1] {
-                    let mut other = mean;
-                    other[direction] += way;
-                    assert!(left(&other) > least);
+                let least = left(&mean);
+                assert!((normal.cost - least).abs() < 1e-6 * least, "{} {least}", normal.cost);
+                for direction in 0..DIRECTIONS {
+                    for way in [-0.1, 0.1] {
+                        let mut other = mean;
+                        other[direction] += way;
+                        assert!(left(&other) > least);
+                    }
                 }
-            }
+            });
         });
-    });
+    }
+}
+
+/// As each row with each, whatever their length and however many there are.
+#[test]
+fn products_of_many_rows_are_those_of_two() {
+    for (of_a, of_b, length) in [(1, 1, 1), (2, 4, 16), (3, 5, 7), (5, 9, 225), (1, 6, 256)] {
+        let numbers = |count: usize| (0..count * length).map(|i| (0.37 * i as f64).sin()).collect::<Vec<f64>>();
+        let (a, b) = (numbers(of_a), numbers(of_b));
+        for is_lower in [false, true] {
+            let mut found = std::vec![f64::NAN; of_a * of_b];
+            f64::products(&a, &b, length, is_lower, |i, j, product| found[i * of_b + j] = product);
+            for (i, j) in (0..of_a).flat_map(|i| (0..of_b).map(move |j| (i, j))).filter(|(i, j)| !is_lower || j <= i) {
+                let row = |rows: &[f64], index: usize| rows[index * length..(index + 1) * length].to_vec();
+                let expected: f64 = row(&a, i).iter().zip(row(&b, j)).map(|(a, b)| a * b).sum();
+                assert!(
+                    (found[i * of_b + j] - expected).abs() < 1e-12 * length as f64,
+                    "{of_a} {of_b} {length} {i} {j}"
+                );
+            }
+        }
+    }
+}
+
+/// Where its place and its strength cannot be told apart, as in a corner, it is there all the same; where another one's strength would do as well, it is not.
+#[test]
+fn what_is_said_for_a_contact_does_not_count_where_it_is() {
+    let mut normal = Normal::<f64, 3> { count: 8, ..Normal::EMPTY };
+    (0..8).for_each(|i| normal.matrix[i][i] = 1000.0);
+    normal.said = [1000.0; 3];
+    normal.matrix[2][0] = 999.0;
+    let said = normal.information([0.0; 4]);
+    assert!((said[0] - 1000.0).abs() < 1.0 && (said[1] - 1000.0).abs() < 1.0, "{said:?}");
+    normal.matrix[6][2] = 999.0;
+    normal.matrix[2][0] = 0.0;
+    let said = normal.information([0.0; 4]);
+    assert!((said[0] - 2.0).abs() < 0.1 && (said[1] - 2.0).abs() < 0.1, "{said:?}");
 }
 
 /// One that is off by a deviation or so in all directions: contacts are where they are, as well as they say, and are not without what is not known.
