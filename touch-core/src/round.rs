@@ -52,6 +52,21 @@ impl<T: Real, const D: usize> OnUnknown<T, D> {
     fn objective(&self) -> T {
         self.left / (self.tau * self.tau) + self.prior
     }
+
+    /// Holds the patterns of contacts that are solved, in what is taken for noise, of those readings that say something; `None` if they make no sense.
+    fn hold<const K: usize>(
+        &mut self,
+        Task { table, frame, errors, unknown }: Task<'_, T>,
+        detector: &Detector<'_, T>,
+        circuit: &Circuit<T, K>,
+        held: &mut Held<'_, T>,
+    ) -> Option<()> {
+        let (noise_v, full_v) = (self.tau * errors.variance_v2.sqrt(), T::of(table.head().full_v));
+        let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
+        self.kept = held.hold(detector, unknown?, circuit, noise_v, self.damping, says)?;
+        self.is_held = true;
+        Some(())
+    }
 }
 
 /// What rounds are gone with.
@@ -178,15 +193,13 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// Steps contacts with the detector's patterns held, and takes it to its posterior's mean; `None` if the scene makes no sense.
     fn step_contacts(&mut self, on: &mut On<'_, '_, T, K>, work: &mut Working<'_, K>) -> Option<Scene<T, K, D>> {
-        let Task { table, frame, errors, .. } = on.task;
-        let (unknown, full_v) = (on.unknown, T::of(table.head().full_v));
+        let task = on.task;
+        let Task { table, frame, errors, .. } = task;
         let noise_v = self.on.tau * errors.variance_v2.sqrt();
         let mut at = self.scene;
         let (detector, circuit, held) = on.solved(&at)?;
         if !self.on.is_held {
-            let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
-            self.on.kept = held.hold(&detector, unknown, circuit, noise_v, self.on.damping, says)?;
-            self.on.is_held = true;
+            self.on.hold(task, &detector, circuit, held)?;
         }
         let kept = self.on.kept;
         held.set_state(&kept, &at.steps);
@@ -265,14 +278,13 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// The fit, looked at where it ended with the patterns that are held.
     fn end_round(&mut self, on: &mut On<'_, '_, T, K>) -> Option<Fit<T, K, D>> {
-        let Task { table, frame, errors, .. } = on.task;
+        let task = on.task;
+        let Task { table, frame, errors, .. } = task;
         let noise_v = self.on.tau * errors.variance_v2.sqrt();
-        let (unknown, full_v) = (on.unknown, T::of(table.head().full_v));
         let (detector, circuit, held) = on.solved(&self.scene)?;
         if self.on.damping != T::ONE {
             self.on.damping = T::ONE;
-            let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
-            self.on.kept = held.hold(&detector, unknown, circuit, noise_v, T::ONE, says)?;
+            self.on.hold(task, &detector, circuit, held)?;
         }
         let kept = self.on.kept;
         held.set_state(&kept, &self.scene.steps);
