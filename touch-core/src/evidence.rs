@@ -15,7 +15,8 @@ use crate::fit::Fit;
 use crate::normal::{ANY_RADIUS, Normal};
 use crate::real::Real;
 use crate::table::Table;
-use crate::vector::PARAMETERS;
+use crate::vector::{PARAMETERS, Vector};
+use crate::walls::{Across, along_tangents};
 
 /// Standard deviation of the logarithm of a conductance before anything is read: nearly nothing is known.
 const CONDUCTANCE_DEVIATION: f32 = 4.0;
@@ -39,10 +40,11 @@ fn sides<T: Real>(table: &Table<'_>) -> [T; 2] {
 }
 
 /// What is known of a contact's parameters before anything is read, but for its radius: one over their variances.
-pub(crate) fn known<T: Real>(table: &Table<'_>) -> [T; PARAMETERS] {
+pub(crate) fn known<T: Real, const K: usize>(table: &Table<'_>, circuit: &Circuit<T, K>) -> Vector<T, K> {
     // Of a place that is even over a side the variance is its square over 12.
     let [x, y] = sides(table).map(|side: T| T::of(12.0) / (side * side));
-    [x, y, T::ONE / (T::of(CONDUCTANCE_DEVIATION) * T::of(CONDUCTANCE_DEVIATION)), T::ZERO]
+    let of_one = [x, y, T::ONE / (T::of(CONDUCTANCE_DEVIATION) * T::of(CONDUCTANCE_DEVIATION)), T::ZERO];
+    along_tangents(table, circuit.loaded.iter().take(circuit.count).map(|one| one.spot.at_m), of_one)
 }
 
 /// Logarithm of the evidence for contacts but for the sum of squares: of the share of what could be before that the readings leave (nats).
@@ -53,12 +55,32 @@ pub(crate) fn ln_volume<T: Real, const K: usize>(
 ) -> T {
     let sides: [T; 2] = sides(table);
     let strength = T::of(CONDUCTANCE_DEVIATION);
-    let Some(ln_determinant) = normal.ln_determinant(known(table)) else { return -T::max_value().sqrt() };
+    let weights = known(table, circuit);
+    let Some(ln_determinant) = normal.ln_determinant(&weights) else { return -T::max_value().sqrt() };
     // Four times half of ln(2 pi), of which the peaks of two normal densities take two.
     let peaks = T::of(core::f64::consts::TAU).ln() - (strength * T::of(ANY_RADIUS)).ln();
     let of_one = peaks - (sides[0] * sides[1]).ln() - T::of(FEWER_NATS);
     let all = (0..circuit.count).map(|k| of_one + T::of(k as u32 + 1).ln() + circuit.loaded[k].ln_over_contact());
-    all.sum::<T>() - T::of(0.5) * ln_determinant
+    all.sum::<T>() - T::of(0.5) * ln_determinant + ln_at_walls(table, circuit, normal, &weights)
+}
+
+/// What walls make of that: where they are near, what is left is not normal along places.
+fn ln_at_walls<T: Real, const K: usize>(
+    table: &Table<'_>,
+    circuit: &Circuit<T, K>,
+    normal: &Normal<T, K>,
+    weights: &Vector<T, K>,
+) -> T {
+    let across = Across::both(table);
+    let radius_m = T::of(table.head().radius_m);
+    let Some((covariance, step)) = normal.posterior(weights) else { return T::ZERO };
+    let of_axis = |k: usize, axis: usize| {
+        let i = PARAMETERS * k + axis;
+        let error_m = radius_m * covariance[i][i].sqrt();
+        let told = across[axis].told(circuit.loaded[k].spot.at_m[axis], radius_m * step[i], error_m);
+        told.map_or(T::ZERO, |told| told.ln_share)
+    };
+    (0..circuit.count).map(|k| of_axis(k, 0) + of_axis(k, 1)).sum()
 }
 
 pub(crate) fn freedom<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> T {

@@ -10,6 +10,7 @@ use crate::solver::{BOARD_CONTACTS, Task};
 use crate::table::Table;
 use crate::unknown::Detector;
 use crate::vector::Vector;
+use crate::walls::Across;
 
 /// Longest way in a step, in usual radii, and longest change of a logarithm.
 const LONGEST_WAY: f32 = 2.0;
@@ -75,13 +76,16 @@ impl<T: Real, const K: usize, const D: usize> Scene<T, K, D> {
 
     pub fn moved(&self, step: &Vector<T, K>, table: &Table<'_>) -> Self {
         let mut moved = *self;
-        let head = table.head();
+        let (head, across) = (table.head(), Across::both(table));
         for (spot, step) in moved.spots.iter_mut().zip(&step.0).take(self.count) {
             let [x, y, ln_ohm, ln_radius] = *step;
-            let shorter =
-                T::of(head.radius_m) * (T::of(LONGEST_WAY) / (x * x + y * y).sqrt().max(T::of(1e-9))).min(T::ONE);
+            let way_m =
+                |d: usize, step: T| across[d].stepped_m(spot.at_m[d], T::of(head.radius_m) * step) - spot.at_m[d];
+            let (x_m, y_m) = (way_m(0, x), way_m(1, y));
+            let longest_m = T::of(LONGEST_WAY) * T::of(head.radius_m);
+            let shorter = (longest_m / (x_m * x_m + y_m * y_m).sqrt().max(T::min_positive_value())).min(T::ONE);
             let held = |step: T| step.clamp(-T::of(LONGEST_LOG), T::of(LONGEST_LOG));
-            let to_m = table.held([spot.at_m[0] + shorter * x, spot.at_m[1] + shorter * y]);
+            let to_m = [spot.at_m[0] + shorter * x_m, spot.at_m[1] + shorter * y_m];
             if table.holds(to_m[0], to_m[1]) {
                 spot.at_m = to_m;
             }
@@ -293,7 +297,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             scene: self.scene,
             cost: self.normal.cost,
             evidence: T::of(2.0) * ln_volume(task.table, circuit, &self.normal) - self.normal.objective(),
-            information: self.normal.information(known(task.table)),
+            information: self.normal.information(&known(task.table, circuit)),
             radius_deviation: self.radius_deviation,
             ..Fit::NONE
         }

@@ -58,6 +58,7 @@ mod unknown;
 #[cfg(test)]
 mod unknown_tests;
 mod vector;
+mod walls;
 
 pub use self::answer::{Answer, Contact, Flags};
 pub use self::contents::Contents;

@@ -11,7 +11,7 @@ use crate::unknown::Detector;
 use crate::vector::{Matrix, PARAMETERS, Vector};
 
 /// Which parameter of a contact is that of its resistance.
-const STRENGTH: usize = 2;
+pub(crate) const STRENGTH: usize = 2;
 /// Standard deviation of the logarithm of a radius before anything is read: a factor of two.
 pub(crate) const ANY_RADIUS: f32 = 0.7;
 /// The same while the number of contacts is not known yet: too few would be made as wide as may be, and lead away from those that are missing.
@@ -197,15 +197,15 @@ impl<T: Real, const K: usize> Normal<T, K> {
     }
 
     /// Logarithm of the determinant of the normal matrix with a prior of these weights of a contact's parameters; `None` where they are not determined.
-    pub fn ln_determinant(&self, weights: [T; PARAMETERS]) -> Option<T> {
+    pub fn ln_determinant(&self, weights: &Vector<T, K>) -> Option<T> {
         let factor = Factor::of(&self.with(weights), T::ZERO)?;
         Some(T::of(2.0) * (0..self.count).map(|i| (factor.rows[i][i] / factor.scale[i]).ln()).sum::<T>())
     }
 
     /// With what was known of each contact's parameters before.
-    fn with(&self, weights: [T; PARAMETERS]) -> Self {
+    fn with(&self, weights: &Vector<T, K>) -> Self {
         let mut all = *self;
-        (0..self.count).for_each(|i| all.matrix[i][i] += weights[i % PARAMETERS]);
+        (0..self.count).for_each(|i| all.matrix[i][i] += weights[i]);
         all
     }
 
@@ -220,7 +220,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
     /// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that
     /// of the derivative by its logarithm, or what others leave of that. Where it is does not count: that one is there may be told where its place is not. Places are
     /// known as these weights say.
-    pub fn information(&self, weights: [T; PARAMETERS]) -> [T; K] {
+    pub fn information(&self, weights: &Vector<T, K>) -> [T; K] {
         let covariance = self.covariance(weights);
         core::array::from_fn(|k| {
             let first = PARAMETERS * k;
@@ -237,8 +237,13 @@ impl<T: Real, const K: usize> Normal<T, K> {
         (0..self.count / PARAMETERS).map(of_one).fold(T::ONE, T::max)
     }
 
-    /// Covariance of the parameters, with a prior of these weights of a contact's; `None` where they are not determined.
-    pub fn covariance(&self, weights: [T; PARAMETERS]) -> Option<Matrix<T, K>> {
+    /// Covariance of the parameters, with a prior of these weights; `None` where they are not determined.
+    pub fn covariance(&self, weights: &Vector<T, K>) -> Option<Matrix<T, K>> {
+        self.posterior(weights).map(|(covariance, _)| covariance)
+    }
+
+    /// The same with the step to the mean.
+    pub fn posterior(&self, weights: &Vector<T, K>) -> Option<(Matrix<T, K>, Vector<T, K>)> {
         let factor = Factor::of(&self.with(weights), T::of(1e-6))?;
         let mut all = Matrix::<T, K>::ZERO;
         for (i, column) in all.iter_mut().enumerate().take(self.count) {
@@ -246,7 +251,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
             unit[i] = T::ONE;
             *column = factor.solved(unit);
         }
-        Some(all)
+        Some((all, factor.solved(self.pull)))
     }
 }
 

@@ -297,7 +297,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             scene: self.scene,
             cost: self.on.left + steps,
             evidence: volume - self.on.left - self.on.prior,
-            information: self.normal.information(known(table)),
+            information: self.normal.information(&known(table, circuit)),
             if_known: self.normal.if_known,
             less_said: self.normal.less_said(),
             radius_deviation: self.radius_deviation,

@@ -8,7 +8,8 @@ use crate::real::Real;
 use crate::solver::{Solver, Task};
 use crate::table::Table;
 use crate::unknown::Detector;
-use crate::vector::{Matrix, PARAMETERS};
+use crate::vector::{Matrix, Vector};
+use crate::walls::NearWalls;
 
 /// Conductance (sheet conductances) above which more would change nothing.
 const SATURATED_SHEETS: f32 = 100.0;
@@ -60,43 +61,46 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         answer.flags.raise(Flags::MISFIT, is_misfit(&fit, readings));
         answer.flags.raise(Flags::CALIBRATE, is_to_be_calibrated(&fit, task));
         answer.residual = (fit.cost.max(T::ZERO) / readings.max(T::ONE)).sqrt();
-        let covariance = self.fitting.normal.covariance(known(table));
+        let posterior = self.fitting.normal.posterior(&known(table, &self.circuit));
         let firmest_s = T::of(SATURATED_SHEETS) * T::of(table.head().sheet_s);
         for k in 0..self.circuit.count {
-            let contact = self.contact(k, table, covariance.as_ref());
+            let contact = self.contact(k, table, posterior.as_ref());
             answer.flags.raise(Flags::SATURATED, contact.conductance_s > firmest_s);
             answer.add(contact);
         }
         answer
     }
 
-    fn contact(&self, k: usize, table: &Table<'_>, covariance: Option<&Matrix<T, K>>) -> Contact<T> {
+    fn contact(&self, k: usize, table: &Table<'_>, posterior: Option<&(Matrix<T, K>, Vector<T, K>)>) -> Contact<T> {
         let (loaded, radius_m) = (&self.circuit.loaded[k], T::of(table.head().radius_m));
-        let first = PARAMETERS * k;
-        let of = |i: usize, j: usize| covariance.map_or(T::infinity(), |all| all[first + i][first + j]);
+        let near_walls =
+            posterior.map(|(covariance, step)| NearWalls::of(table, loaded.spot.at_m, k, covariance, step));
+        let of = |i: usize, j: usize| near_walls.as_ref().map_or(T::infinity(), |known| known.covariance[i][j]);
+        let (at_m, shift) = near_walls.as_ref().map_or((loaded.spot.at_m, T::ZERO), |known| (known.at_m, known.ln_ohm));
         // What the readings do not tell is known as well as where a fit may go.
         let deviation = |i: usize, most: T| if of(i, i) >= T::ZERO { of(i, i).sqrt().min(most) } else { most };
         let log_radius = deviation(3, T::of(LN_RADII[1] - LN_RADII[0]));
         let [low_m, high_m] = table.bounds_m();
         let size = [0, 1].map(|d| T::of(high_m[d] - low_m[d]) / radius_m);
-        let shift = T::of(table.head().shift_m) / radius_m;
+        let shift_of_table = T::of(table.head().shift_m) / radius_m;
         let [x, y] = [0, 1].map(|i| {
             let of_readings = deviation(i, size[i]);
-            (of_readings * of_readings + shift * shift).sqrt()
+            (of_readings * of_readings + shift_of_table * shift_of_table).sqrt()
         });
         let of_detector = T::of(table.head().ln_conductance_error);
         let most = T::of(LN_SQUARES[1] - LN_SQUARES[0]);
         let variance = loaded.conductance_variance(table, radius_m, of).min(most * most) + of_detector * of_detector;
-        let conductance_s = loaded.conductance_s();
-        let apparent_conductance_s = T::ONE / (loaded.share * loaded.ohm);
+        // Both are as much larger as the resistance is smaller.
+        let conductance_s = loaded.conductance_s() * (-shift * loaded.ln_over_contact().exp()).exp();
+        let apparent_conductance_s = (-shift).exp() / (loaded.share * loaded.ohm);
         Contact {
             id: self.ids[k],
-            x_m: loaded.spot.at_m[0],
-            y_m: loaded.spot.at_m[1],
+            x_m: at_m[0],
+            y_m: at_m[1],
             conductance_s,
             conductance_sigma_s: conductance_s * variance.sqrt(),
             apparent_conductance_s,
-            force_n: table.force_n(loaded.spot.at_m, apparent_conductance_s),
+            force_n: table.force_n(at_m, apparent_conductance_s),
             radius_m: loaded.radius_m,
             radius_sigma_m: loaded.radius_m * log_radius,
             sigma_m: [radius_m * x, radius_m * y],
