@@ -7,7 +7,7 @@ use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
 use crate::samples::{CELLS, field_ohm, fields_ohm, grid_m, table, table_of};
 use crate::tests::{Circuit, Normal, Spot, spot, volts};
 use crate::unknown::Detector;
-use crate::vector::PARAMETERS;
+use crate::vector::{PARAMETERS, Vector};
 use crate::{Frame, Says, Table};
 
 pub(crate) const ALL: [u8; (CELLS * CELLS).div_ceil(8)] = [255; (CELLS * CELLS).div_ceil(8)];
@@ -353,7 +353,7 @@ fn the_normal_matrix_is_how_the_sum_of_squares_bends() {
             let bend = 0.5 * (at(0.02) + at(-0.02)) / (0.02 * 0.02);
             assert!((bend / normal.matrix[i][i] - 1.0).abs() < 0.06, "{i}: {bend} {}", normal.matrix[i][i]);
         }
-        let covariance = normal.covariance([0.0; PARAMETERS]).unwrap();
+        let covariance = normal.covariance(&Vector::ZERO).unwrap();
         // Times the matrix it is one.
         for i in 0..normal.count {
             for j in 0..normal.count {

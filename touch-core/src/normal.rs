@@ -11,7 +11,7 @@ use crate::unknown::Detector;
 use crate::vector::{Matrix, PARAMETERS, Vector};
 
 /// Which parameter of a contact is that of its resistance.
-pub(crate) const STRENGTH: usize = 2;
+const STRENGTH: usize = 2;
 /// Standard deviation of the logarithm of a radius before anything is read: a factor of two.
 pub(crate) const ANY_RADIUS: f32 = 0.7;
 /// The same while the number of contacts is not known yet: too few would be made as wide as may be, and lead away from those that are missing.

@@ -324,12 +324,6 @@ impl<'a> Table<'a> {
         [[left_m, bottom_m], [left_m + columns as f32 * step_x_m, bottom_m + rows as f32 * step_y_m]]
     }
 
-    /// The nearest place of that rectangle (m).
-    pub(crate) fn held<T: Real>(&self, [x_m, y_m]: [T; 2]) -> [T; 2] {
-        let [low_m, high_m] = self.bounds_m().map(|corner_m| corner_m.map(T::of));
-        [x_m.max(low_m[0]).min(high_m[0]), y_m.max(low_m[1]).min(high_m[1])]
-    }
-
     /// The cell of a place, and the shares of the ways through it.
     pub(crate) fn cell<T: Real>(&self, x_m: T, y_m: T) -> ([usize; 2], [T; 2]) {
         let [columns, rows] = self.cells();

@@ -76,23 +76,22 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         let near_walls =
             posterior.map(|(covariance, step)| NearWalls::of(table, loaded.spot.at_m, k, covariance, step));
         let of = |i: usize, j: usize| near_walls.as_ref().map_or(T::infinity(), |known| known.covariance[i][j]);
-        let (at_m, shift) = near_walls.as_ref().map_or((loaded.spot.at_m, T::ZERO), |known| (known.at_m, known.ln_ohm));
+        let at_m = near_walls.as_ref().map_or(loaded.spot.at_m, |known| known.at_m);
         // What the readings do not tell is known as well as where a fit may go.
         let deviation = |i: usize, most: T| if of(i, i) >= T::ZERO { of(i, i).sqrt().min(most) } else { most };
         let log_radius = deviation(3, T::of(LN_RADII[1] - LN_RADII[0]));
         let [low_m, high_m] = table.bounds_m();
         let size = [0, 1].map(|d| T::of(high_m[d] - low_m[d]) / radius_m);
-        let shift_of_table = T::of(table.head().shift_m) / radius_m;
+        let shift = T::of(table.head().shift_m) / radius_m;
         let [x, y] = [0, 1].map(|i| {
             let of_readings = deviation(i, size[i]);
-            (of_readings * of_readings + shift_of_table * shift_of_table).sqrt()
+            (of_readings * of_readings + shift * shift).sqrt()
         });
         let of_detector = T::of(table.head().ln_conductance_error);
         let most = T::of(LN_SQUARES[1] - LN_SQUARES[0]);
         let variance = loaded.conductance_variance(table, radius_m, of).min(most * most) + of_detector * of_detector;
-        // Both are as much larger as the resistance is smaller.
-        let conductance_s = loaded.conductance_s() * (-shift * loaded.ln_over_contact().exp()).exp();
-        let apparent_conductance_s = (-shift).exp() / (loaded.share * loaded.ohm);
+        let conductance_s = loaded.conductance_s();
+        let apparent_conductance_s = T::ONE / (loaded.share * loaded.ohm);
         Contact {
             id: self.ids[k],
             x_m: at_m[0],

@@ -11,6 +11,7 @@ use crate::samples::{CELLS, fields_ohm, grid_m, table};
 use crate::solver::Solver;
 use crate::table::Table;
 use crate::unknown::{Change, Detector, Direction, Layout, Moved, Unknown, pairs};
+use crate::vector::Vector;
 use crate::{Answer, Room};
 
 const N: usize = 16;
@@ -248,11 +249,11 @@ fn what_is_said_for_a_contact_does_not_count_where_it_is() {
     (0..8).for_each(|i| normal.matrix[i][i] = 1000.0);
     normal.said = [1000.0; 3];
     normal.matrix[2][0] = 999.0;
-    let said = normal.information([0.0; 4]);
+    let said = normal.information(&Vector::ZERO);
     assert!((said[0] - 1000.0).abs() < 1.0 && (said[1] - 1000.0).abs() < 1.0, "{said:?}");
     normal.matrix[6][2] = 999.0;
     normal.matrix[2][0] = 0.0;
-    let said = normal.information([0.0; 4]);
+    let said = normal.information(&Vector::ZERO);
     assert!((said[0] - 2.0).abs() < 0.1 && (said[1] - 2.0).abs() < 0.1, "{said:?}");
 }
 
