@@ -210,7 +210,12 @@ impl<T: Real> NearWalls<T> {
             let Some(told) = across.told(at_m[axis], radius_m * step[first + axis], radius_m * own[axis].sqrt()) else {
                 continue;
             };
-            known.at_m[axis] = told.mean_m;
+            let mut there_m = known.at_m;
+            there_m[axis] = told.mean_m;
+            if !table.holds(there_m[0], there_m[1]) {
+                continue;
+            }
+            known.at_m = there_m;
             // What the place is not any more, others are not either that go with it.
             for i in 0..PARAMETERS {
                 for j in 0..PARAMETERS {
