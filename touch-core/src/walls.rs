@@ -131,7 +131,8 @@ impl<T: Real> Across<T> {
         let slope = self.slope(x_m);
         let (at_m, sigma_m) = (self.straight_m(from_m), slope * error_m);
         let mean_m = at_m + slope * if is_low { step_m } else { -step_m };
-        if !(sigma_m > T::ZERO) || mean_m - T::of(REACH) * sigma_m > self.straight_m(self.ends_m[LAST]) {
+        let is_near = mean_m - T::of(REACH) * sigma_m <= self.straight_m(self.ends_m[LAST]);
+        if !is_near || sigma_m <= T::ZERO {
             return None;
         }
         let reach_m = T::of(REACH) * sigma_m;
