@@ -19,7 +19,7 @@ use crate::solve::problem::Problem;
 /// Radii of the small and of the wide disc, in usual ones.
 const DISCS: [f64; RADII] = [0.6, 2.2];
 /// What readings by a table are off from the model's, as a share of the largest: with it four or five contacts leave 0.9 of what they may, with 0.0006 0.75. Of 180 random
-/// scenes of one to five contacts on `square-60` 140 have the right number of contacts, and 130 with 0.0006.
+/// scenes of one to five contacts on `square-60` 139 have the right number of contacts, and 130 with 0.0006.
 const TABLE_SHARE: f64 = 0.0003;
 /// Why a detector has no table.
 #[derive(Debug, thiserror::Error)]
