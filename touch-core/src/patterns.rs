@@ -107,6 +107,7 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
             for (e, ohm) in row.iter_mut().enumerate() {
                 *ohm = T::of(of_pair(pads_ohm, e, g));
             }
+            row[g] *= self.detector.moved.as_ref().map_or(T::ONE, |(_, moved)| moved.crowding[g]);
             for ((one, fields), couples) in loaded.iter().zip(&halved).zip(&couples) {
                 add(row, -one.currents[g], fields);
                 add(row, -fields[g], &one.currents);

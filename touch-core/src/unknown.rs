@@ -51,7 +51,8 @@ pub struct Unknown<'a> {
     pub tables: usize,
     /// Coefficients of changes of the fields of the electrodes, and of the disc's own (ohm): rows of `y`, in them of `x`, for each all tables of `n + 1`.
     pub fields_ohm: &'a [f32],
-    /// Changes of the fields between the electrodes (ohm): tables of lower triangles.
+    /// Changes of the fields between the electrodes (ohm): tables of lower triangles. On the diagonal, the field of an electrode at itself, they are those of its logarithm
+    /// times what it is: its current crowds at the pad, where what a direction makes of the layer is a factor.
     pub pads_ohm: &'a [f32],
     /// Changes of the spline over distances (ohm): tables of `k`.
     pub distances_ohm: &'a [f32],
@@ -196,6 +197,8 @@ pub(crate) struct Moved<'m, T> {
     pub gains: &'m [T],
     pub offsets_v: &'m [T],
     pub bows_v: &'m [T],
+    /// Factor on each electrode's field at itself.
+    pub crowding: &'m [T],
     /// Own impedance of each pad, and the switch's (ohm).
     pub own_pads_ohm: &'m [T],
     pub switch_ohm: T,
@@ -221,9 +224,9 @@ impl Layout {
         Self { electrodes: table.electrodes(), knots: table.knots(), directions: unknown.directions.len() }
     }
 
-    fn counts(&self) -> [usize; 8] {
+    fn counts(&self) -> [usize; 9] {
         let n = self.electrodes;
-        [self.directions, pairs(n), self.knots, pairs(n + 1), n, n, n, n + 1]
+        [self.directions, pairs(n), self.knots, pairs(n + 1), n, n, n, n, n + 1]
     }
 
     /// How many numbers it takes.
@@ -246,7 +249,7 @@ impl Layout {
             rest = after;
             part
         };
-        let [own, pads, distances, walls, gains, offsets, bows, last] = self.counts().map(&mut part);
+        let [own, pads, distances, walls, crowding, gains, offsets, bows, last] = self.counts().map(&mut part);
         own.copy_from_slice(&steps[..self.directions]);
         table.parts([&mut *pads, &mut *distances, &mut *walls]);
         let n = self.electrodes;
@@ -276,9 +279,11 @@ impl Layout {
         }
         gains.iter_mut().for_each(|gain| *gain = gain.exp());
         for e in 0..n {
-            let own_ohm = T::of(unknown.own_pads_ohm[e]);
+            let (own_ohm, there_ohm) = (T::of(unknown.own_pads_ohm[e]), T::of(table.pads_ohm(e, e)));
             let factor = last[e].exp();
-            pads[pairs(e) + e] += own_ohm * (factor - T::ONE);
+            let at_itself = &mut pads[pairs(e) + e];
+            crowding[e] = ((*at_itself - there_ohm) / there_ohm).exp();
+            *at_itself = there_ohm * crowding[e] + own_ohm * (factor - T::ONE);
             last[e] = own_ohm * factor;
         }
         let switch_ohm = T::of(table.head().on_resistance_ohm) * last[n].exp();
@@ -291,6 +296,7 @@ impl Layout {
             gains,
             offsets_v: offsets,
             bows_v: bows,
+            crowding,
             own_pads_ohm: &last[..n],
             switch_ohm,
         }

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::between::{Between, Paired};
 use super::splines::Splines;
@@ -258,13 +258,19 @@ fn table_of(
     let mut values: Vec<Vec<f64>> = base.iter().map(|fields| vec![0.0; fields.len()]).collect();
     let n = coarse.electrode_fields_ohm().nrows();
     let mut pads_ohm = DMatrix::zeros(n, n);
+    let there_ohm = coarse.electrode_fields_ohm().diagonal();
+    let mut at_itself_ohm = DVector::zeros(n);
     for (share, model) in sum {
         let own = if Arc::ptr_eq(model, coarse) { None } else { Some(sampled(&**model, splines, radius_m)?) };
         for (sums, fields) in values.iter_mut().zip(own.as_deref().unwrap_or(base)) {
             sums.iter_mut().zip(fields).for_each(|(sum, ohm)| *sum += share * ohm);
         }
         pads_ohm += model.electrode_fields_ohm() * *share;
+        at_itself_ohm +=
+            model.electrode_fields_ohm().diagonal().zip_map(&there_ohm, |ohm, there| there * (ohm / there).ln())
+                * *share;
     }
+    pads_ohm.set_diagonal(&at_itself_ohm);
     let what = || ForwardError::Detector {
         detector: coarse.detector().name.clone(),
         what: "its model has no small contacts".to_owned(),
