@@ -222,6 +222,7 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     pub(crate) worth: T,
     /// What is not known of a detector.
     pub(crate) on: OnUnknown<T, D>,
+    pub(crate) held_at: Scene<T, K, D>,
 }
 
 impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
@@ -237,11 +238,12 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         has_looked: false,
         worth: T::ZERO,
         on: OnUnknown::NONE,
+        held_at: Scene::EMPTY,
     };
 
     /// Begins to step from a scene to where it fits best, so many steps at most.
     pub fn begin(&mut self, scene: Scene<T, K, D>, radius_deviation: T, steps: u8) {
-        self.on.is_held &= scene == self.scene && self.on.damping == T::ONE;
+        self.on.is_held &= self.on.damping == T::ONE;
         self.on.damping = T::ONE;
         self.worth = T::of(if steps <= TRYING { ROUGHLY } else { EXACTLY });
         (self.scene, self.trial, self.radius_deviation) = (scene, scene, radius_deviation);

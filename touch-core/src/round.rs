@@ -5,7 +5,7 @@
 //! detector would be bent until it explained it.
 
 use crate::births::Births;
-use crate::circuit::Circuit;
+use crate::circuit::{Circuit, Spot};
 use crate::evidence::{known, ln_volume};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
 use crate::frame::left_v;
@@ -14,7 +14,7 @@ use crate::normal::Normal;
 use crate::real::Real;
 use crate::scan::Candidates;
 use crate::solver::Task;
-use crate::table::MAX_ELECTRODES;
+use crate::table::{MAX_ELECTRODES, Table};
 use crate::unknown::{Detector, Layout, Unknown};
 
 /// Steps of contacts in a round.
@@ -29,6 +29,8 @@ const MOST_DAMPING: f32 = 1e4;
 const NOISE: f32 = 1.3;
 const LEAST_SHARE: f32 = 0.2;
 const WORTH: f32 = 0.8;
+/// How far contacts move, in usual radii and as logarithms, before patterns are taken anew.
+const NEAR: f32 = 0.5;
 
 /// Where a fit on a detector that is not known is.
 #[derive(Clone, Copy, Debug)]
@@ -114,6 +116,19 @@ fn prior<T: Real, const K: usize, const D: usize>(scene: &Scene<T, K, D>, radius
     radii.chain(scene.steps).map(|deviations| deviations * deviations).sum()
 }
 
+impl<T: Real, const K: usize, const D: usize> Scene<T, K, D> {
+    /// Whether patterns of contacts here serve for those of another scene.
+    fn is_near(&self, other: &Self, table: &Table<'_>) -> bool {
+        let (near, radius_m) = (T::of(NEAR), T::of(table.head().radius_m));
+        let is_near = |(one, other): (&Spot<T>, &Spot<T>)| {
+            let [x, y] = [0, 1].map(|d| (one.at_m[d] - other.at_m[d]) / radius_m);
+            let logs = [one.ln_ohm - other.ln_ohm, one.ln_radius - other.ln_radius];
+            x * x + y * y < near * near && logs.into_iter().all(|log| log.abs() < near)
+        };
+        self.count == other.count && self.spots().iter().zip(other.spots()).all(is_near)
+    }
+}
+
 impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     /// Goes one round.
     pub(crate) fn go_round(
@@ -138,7 +153,6 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             return Went::ToEnd(self.end_round(&mut on));
         }
         let share = self.go_towards(&to, &mut on);
-        self.on.is_held &= share == T::ZERO;
         let is_less_noise = self.take_noise(task.readings());
         let is_worth_it = before - self.on.objective() >= self.worth;
         let is_shorter = self.damp(share);
@@ -198,8 +212,9 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let noise_v = self.on.tau * errors.variance_v2.sqrt();
         let mut at = self.scene;
         let (detector, circuit, held) = on.solved(&at)?;
-        if !self.on.is_held {
+        if !(self.on.is_held && self.held_at.is_near(&at, table)) {
             self.on.hold(task, &detector, circuit, held)?;
+            self.held_at = at;
         }
         let kept = self.on.kept;
         held.set_state(&kept, &at.steps);

@@ -18,6 +18,8 @@ const MOST_OF: f32 = 8.0;
 const SURE: f32 = 500.0;
 /// By how much a contact that was looked for anew has to be better (squared deviations): of two that are alike the first stays.
 const BETTER: f32 = 7.0;
+/// By how much an explanation with fewer contacts may be worse (what is a misfit at least) after some steps to be fitted to its end.
+const CLOSE: f32 = 1.0;
 /// Steps at most where the best start is searched.
 const SEARCHING: u8 = 20;
 
@@ -58,6 +60,8 @@ enum Awaits {
     /// The best explanation without the contact that is looked for anew, and without one that the others may do as well without.
     Rest,
     Fewer(u8),
+    /// The same, to its end.
+    FewerToEnd(u8),
 }
 
 /// What an explanation is made from.
@@ -191,6 +195,18 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                 None => self.exchanged(readings),
             },
             Awaits::Fewer(contact) => {
+                let is_close = |fewer: &Fit<T, K, D>| {
+                    self.kept.is_some_and(|kept| score(fewer) < score(&kept) + T::of(CLOSE) * limit(readings))
+                };
+                match found.filter(is_close) {
+                    Some(fewer) => {
+                        self.awaits = Awaits::FewerToEnd(contact);
+                        Wants::Fit(fewer.scene, T::of(ANY_RADIUS), SEARCHING)
+                    }
+                    None => self.leave_out_after(Some(contact)),
+                }
+            }
+            Awaits::FewerToEnd(contact) => {
                 self.tried = better(self.tried, found);
                 self.leave_out_after(Some(contact))
             }
@@ -405,7 +421,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         let next = contact.map_or(0, |contact| usize::from(contact) + 1);
         if let Some(next) = (next..kept.scene.count).find(|contact| is_unsure(&kept, *contact)) {
             self.awaits = Awaits::Fewer(next as u8);
-            return Wants::Fit(kept.scene.without(next), T::of(ANY_RADIUS), SEARCHING);
+            return Wants::Fit(kept.scene.without(next), T::of(ANY_RADIUS), TRYING);
         }
         match self.tried.filter(|fewer| score(fewer) < score(&kept)) {
             Some(fewer) => {
