@@ -1,6 +1,6 @@
 use super::*;
 use crate::solve::pipeline::method::Method;
-use tactomo_physics::detector::{ConverterErrors, Detector, ForceLaw, electrode_grid};
+use tactomo_physics::detector::{ConverterErrors, Detector, ForceLaw, Parameter, Tolerances, electrode_grid};
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::scene::Contact as Disc;
 use tactomo_physics::simulate::{Noise, drawn, measured};
@@ -191,6 +191,42 @@ fn on_detectors_as_built_contacts_are_counted_and_a_calibration_is_asked_for() {
     }
     assert!(right >= 14, "{right} of 16");
     assert!(10 * within >= 9 * places, "{within} of {places}");
+}
+
+/// Far from what is described, changes that multiply each other tell: a pad on a layer that conducts three times worse there than on top has twice the field at itself, of
+/// which unevenness takes its part.
+#[test]
+fn detectors_far_from_their_description_leave_no_more_than_noise() {
+    let described = Detector::preset("square-60").unwrap();
+    let mut solver = Compiled::new(&Problem::of(&described).unwrap()).unwrap();
+    let tolerances = described.tolerances;
+    let twice_as_uneven =
+        Tolerances { uneven_share: 2.0 * tolerances.uneven_share, top_over_bottom_factor: 1.0, ..tolerances };
+    let (mut errors_m, mut residuals, mut within) = (Vec::new(), Vec::new(), 0);
+    for seed in 0..3 {
+        let built = drawn(&Detector { tolerances: twice_as_uneven, ..described.clone() }, seed);
+        let built = built.stepped(&[(Parameter::TopOverBottom, 3f64.ln())]);
+        let slab = Slab::with_resolution(&built, Resolution::FINE).unwrap();
+        let (mut noise, mut random) = (Noise::new(seed), fastrand::Rng::with_seed(seed));
+        for _ in 0..12 {
+            let [x_m, y_m] = [0, 1].map(|_| 0.05 * (random.f64() - 0.5));
+            let disc = disc(x_m, y_m, 0.0025, 0.1 * 20f64.powf(random.f64()));
+            let readings = readings_v(&slab.impedance_ohm(&[disc]).unwrap(), &built);
+            solver.reset();
+            let solution = solver.solve(&measured(&readings, &built.adc, &mut noise)).unwrap();
+            let [found] = &solution.contacts[..] else { panic!("{disc:?} {solution:?}") };
+            let known = found.uncertainty.unwrap();
+            errors_m.push(off_m(found, &disc));
+            residuals.push(solution.residual.unwrap());
+            within += usize::from(off_m(found, &disc) < 2.0 * known.x_m.hypot(known.y_m));
+        }
+    }
+    errors_m.sort_unstable_by(f64::total_cmp);
+    residuals.sort_unstable_by(f64::total_cmp);
+    let middle = errors_m.len() / 2;
+    assert!(errors_m[middle] < 3e-4, "{errors_m:?}");
+    assert!(residuals[middle] < 1.1, "{residuals:?}");
+    assert!(within >= 32, "{within} of {}", errors_m.len());
 }
 
 #[test]
