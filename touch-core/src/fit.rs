@@ -220,7 +220,7 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     pub(crate) has_looked: bool,
     /// What another round has to gain (squared deviations).
     pub(crate) worth: T,
-    /// What is not known of a detector.
+    /// What is not known of a detector, and the scene whose patterns are held.
     pub(crate) on: OnUnknown<T, D>,
     pub(crate) held_at: Scene<T, K, D>,
 }

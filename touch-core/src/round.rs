@@ -42,7 +42,7 @@ pub(crate) struct OnUnknown<T, const D: usize> {
     prior: T,
     /// Weight of the squares of what the detector's next step is, where that of those of its steps from the description is one.
     pub damping: T,
-    /// Directions whose patterns are held, and whether they are those of the scene.
+    /// Directions whose patterns are held, and whether they are: in what is taken for noise and with that weight.
     pub kept: Kept<D>,
     pub is_held: bool,
 }
@@ -297,15 +297,14 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let Task { table, frame, errors, .. } = task;
         let noise_v = self.on.tau * errors.variance_v2.sqrt();
         let (detector, circuit, held) = on.solved(&self.scene)?;
-        if self.on.damping != T::ONE {
+        if !self.on.is_held || self.on.damping != T::ONE {
             self.on.damping = T::ONE;
             self.on.hold(task, &detector, circuit, held)?;
+            self.held_at = self.scene;
         }
         let kept = self.on.kept;
         held.set_state(&kept, &self.scene.steps);
         self.normal.sum_up_held(&detector, circuit, frame, noise_v, self.radius_deviation, (held, kept.count));
-        // Near enough to hold for what comes next at this scene.
-        self.on.is_held = true;
         let steps: T = self.scene.steps.iter().map(|step| *step * *step).sum();
         let volume = T::of(2.0) * ln_volume(table, circuit, &self.normal) - held.ln_determinant(kept.count);
         Some(Fit {
