@@ -61,7 +61,7 @@ enum Awaits {
     /// The best explanation without the contact that is looked for anew, and without one that the others may do as well without.
     Rest,
     Fewer(u8),
-    /// The same, to its end.
+    /// That without one, where it came near, fitted to its end.
     FewerToEnd(u8),
 }
 

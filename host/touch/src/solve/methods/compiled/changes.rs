@@ -258,6 +258,7 @@ fn table_of(
     let mut values: Vec<Vec<f64>> = base.iter().map(|fields| vec![0.0; fields.len()]).collect();
     let n = coarse.electrode_fields_ohm().nrows();
     let mut pads_ohm = DMatrix::zeros(n, n);
+    // An electrode's field at itself changes by factors: their logarithms are summed up.
     let there_ohm = coarse.electrode_fields_ohm().diagonal();
     let mut at_itself_ohm = DVector::zeros(n);
     for (share, model) in sum {
