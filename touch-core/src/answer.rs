@@ -79,6 +79,27 @@ impl Flags {
     }
 }
 
+/// How sure it is how many contacts there are, by the evidence for other numbers of them that a search tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certainty<T = f32> {
+    /// Probability that there are as many as are told.
+    pub share: T,
+    /// The likeliest other number, and its probability.
+    pub other: Option<(usize, T)>,
+}
+
+impl<T: Real> Certainty<T> {
+    /// Of so many contacts, whose evidence is `exp(-score / 2)`, against the best with one, two and more of them.
+    pub(crate) fn of(count: usize, score: T, by_count: &[Option<T>]) -> Self {
+        let odds = |other: T| (T::of(0.5) * (score - other)).exp();
+        let tried = by_count.iter().enumerate().map(|(index, other)| (index + 1, other.map_or(T::ZERO, odds)));
+        let others = || tried.clone().filter(|(other, odds)| *other != count && *odds > T::ZERO);
+        let share = T::ONE / (T::ONE + others().map(|(_, odds)| odds).sum::<T>());
+        let likeliest = others().max_by(|(_, a), (_, b)| a.total_cmp(b));
+        Self { share, other: likeliest.map(|(other, odds)| (other, odds * share)) }
+    }
+}
+
 /// The answer for a frame: up to `K` contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer<T = f32, const K: usize = BOARD_CONTACTS> {
@@ -88,6 +109,8 @@ pub struct Answer<T = f32, const K: usize = BOARD_CONTACTS> {
     pub flags: Flags,
     /// Root mean square of what is left of the readings, in standard deviations of the noise and the table's own error.
     pub residual: T,
+    /// How sure their number is, since the last search; none where nothing is told, or the readings do not fit.
+    pub certainty: Option<Certainty<T>>,
     /// Electrodes that are left out, since their wires are broken: a bit each.
     pub left_out: u32,
     /// What it took.
@@ -108,7 +131,7 @@ impl<T: Real, const K: usize> Answer<T, K> {
 
     pub(crate) fn of(work: Work<K>) -> Self {
         let contacts = [Contact::NONE; K];
-        Self { contacts, count: 0, flags: Flags::default(), residual: T::ZERO, left_out: 0, work }
+        Self { contacts, count: 0, flags: Flags::default(), residual: T::ZERO, certainty: None, left_out: 0, work }
     }
 
     pub(crate) fn add(&mut self, contact: Contact<T>) {

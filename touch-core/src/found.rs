@@ -296,7 +296,7 @@ fn a_search_grows_exchanges_and_reduces() {
     let costs = [0.0, 5000.0, 230.0, 229.0];
     let by_count =
         |scene: &Scene, _| Some(fit(scene.count, costs[scene.count], 2000.0)).filter(|fit| fit.scene.count > 0);
-    let gains = |scene: &Scene| if scene.count < 2 { 4000.0 } else { 10.0 };
+    let gains = |scene: &Scene| if scene.count < 2 { 4000.0 } else { 5.0 };
     let wants = search.begin(None, None, 240.0);
     let (asked, found) = run(&mut search, wants, by_count, gains);
     assert_eq!(found.unwrap().scene.count, 2);
@@ -322,7 +322,7 @@ fn a_search_grows_exchanges_and_reduces() {
     assert_eq!(anew, 2, "{asked:?}");
     // One of which little is known goes where the other does as well: it is looked for anew, or where the detector is not known only left out.
     for (less_said, deviation) in [(1.0, usual), (1.5, any)] {
-        let of = |count: usize, cost: f32| Fit { less_said, ..fit(count, cost, 100.0) };
+        let of = |count: usize, cost: f32| Fit { less_said, ..fit(count, cost, 40.0) };
         let alike = |scene: &Scene, _| {
             Some(of(scene.count, if scene.count == 1 { 241.0 } else { 230.0 })).filter(|fit| fit.scene.count > 0)
         };
@@ -353,6 +353,72 @@ fn a_search_grows_exchanges_and_reduces() {
         |_| 500.0,
     );
     assert!(search.more && found.unwrap().scene.count == 3);
+}
+
+/// What one more contact cannot be added to, or leaves more than before, is what is found; and what another one has made needless is left out on the way.
+#[test]
+fn what_more_contacts_do_not_mend_is_kept() {
+    for spoilt in [None, Some(9000.0)] {
+        let costs = |scene: &Scene, _| match scene.count {
+            0 => None,
+            1 | 2 => Some(fit(scene.count, 8000.0 - scene.count as f32, 2000.0)),
+            _ => spoilt.map(|cost| fit(scene.count, cost, 2000.0)),
+        };
+        let mut search = Search::NONE;
+        let wants = search.begin(None, None, 240.0);
+        let (asked, found) = run(&mut search, wants, costs, |_| 4000.0);
+        assert!(asked.contains(&(2, ANY_RADIUS)), "{spoilt:?} {asked:?}");
+        assert_eq!(found.unwrap().scene.count, 2, "{spoilt:?} {asked:?}");
+    }
+    let needless = |scene: &Scene, _| {
+        let mut of = fit(scene.count, 20_000.0 / scene.count.max(1) as f32, 2000.0);
+        of.information[0] = 1.0;
+        Some(of).filter(|of| of.scene.count > 0)
+    };
+    let mut search = Search::NONE;
+    let wants = search.begin(None, None, 240.0);
+    let (asked, _) = run(&mut search, wants, needless, |_| 4000.0);
+    let numbers: Vec<_> = asked.iter().map(|(count, _)| *count).collect();
+    assert_eq!(numbers[..3], [1, 2, 2], "the first is left out, where there is a second: {asked:?}");
+}
+
+/// A contact alone that explains its frame badly is looked for anew, at all places that may do.
+#[test]
+fn a_contact_alone_that_went_astray_is_looked_for_anew() {
+    let mut tries = 0;
+    let astray = |scene: &Scene, _| {
+        tries += 1;
+        let cost = if tries > 2 { 230.0 } else { 900.0 };
+        Some(fit(scene.count, cost, 2000.0)).filter(|of| of.scene.count > 0)
+    };
+    let mut search = Search::NONE;
+    let wants = search.begin(Some(fit(1, 900.0, 2000.0)), None, 240.0);
+    let (_, found) = run(&mut search, wants, astray, |scene| if scene.count == 0 { 4000.0 } else { 0.0 });
+    assert_eq!(found.map(|found| (found.scene.count, found.cost)), Some((1, 230.0)));
+}
+
+/// Shares of numbers of contacts are as their evidence.
+#[test]
+fn how_sure_a_number_is_goes_with_the_evidence() {
+    let sure = crate::Certainty::of(2, 100.0, &[None, Some(100.0), None]);
+    assert_eq!((sure.share, sure.other), (1.0, None));
+    let ln_3 = 3f32.ln();
+    let unsure = crate::Certainty::of(2, 100.0, &[Some(300.0), Some(100.0), Some(100.0 + 2.0 * ln_3)]);
+    let (other, share) = unsure.other.unwrap();
+    assert!((unsure.share - 0.75).abs() < 1e-5 && other == 3 && (share - 0.25).abs() < 1e-5, "{unsure:?}");
+    // A search tells it of what it has tried.
+    let costs = [0.0, 5000.0, 230.0, 210.0];
+    let by_count = |scene: &Scene, radius_deviation| {
+        let of = fit(scene.count, costs[scene.count], 2000.0);
+        Some(Fit { radius_deviation, ..of }).filter(|of| of.scene.count > 0)
+    };
+    let mut search = Search::NONE;
+    let wants = search.begin(None, None, 240.0);
+    let (_, found) = run(&mut search, wants, by_count, |scene| if scene.count < 2 { 4000.0 } else { 20.0 });
+    let told = search.certainty(&found.unwrap());
+    // Three leave 20 less and cost 21 more.
+    let odds = (-0.5f32).exp();
+    assert!((told.share - 1.0 / (1.0 + odds)).abs() < 1e-3 && told.other.unwrap().0 == 3, "{told:?}");
 }
 
 /// What a search would add beside a contact is what is missing there, and gains what a fit gains by it.

@@ -60,7 +60,7 @@ mod unknown_tests;
 mod vector;
 mod walls;
 
-pub use self::answer::{Answer, Contact, Flags};
+pub use self::answer::{Answer, Certainty, Contact, Flags};
 pub use self::contents::Contents;
 pub use self::fit::Work;
 pub use self::frame::{Frame, FrameError, Says};

@@ -6,7 +6,7 @@
 //!
 //! All that is done in pieces, each of which ends soon, so that whoever has something else to do between them can.
 
-use crate::answer::{Answer, Flags};
+use crate::answer::{Answer, Certainty, Flags};
 use crate::beside::beside;
 use crate::circuit::Circuit;
 use crate::evidence::{freedom, is_misfit, is_nothing, limit, score, weakest};
@@ -96,6 +96,8 @@ pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS, const D: usize = 0> 
     pub(crate) next_id: u32,
     /// What the last search left of a reading, and the frames that one that did not end well is not repeated for.
     searched: T,
+    /// How sure it was of the number of contacts that it found.
+    certainty: Option<Certainty<T>>,
     patience: u32,
     wait: u32,
     /// Whether the last frame was not explained by what was followed, or there was none.
@@ -147,6 +149,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             ids: [0; K],
             next_id: 1,
             searched: T::ZERO,
+            certainty: None,
             patience: PATIENCE[0],
             wait: 0,
             was_lost: true,
@@ -397,6 +400,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     fn found(&mut self, found: Option<Fit<T, K, D>>, task: Task<'_, T>) -> Option<Answer<T, K>> {
         self.search.more &= found.is_some();
         self.searched = found.map_or(T::ZERO, |fit| fit.cost);
+        self.certainty = found.map(|fit| self.search.certainty(&fit));
         let fits = self.pieces < Self::MOST_PIECES && found.is_none_or(|fit| !is_misfit(&fit, task.readings()));
         self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
         self.wait = if fits { 0 } else { self.patience };
@@ -419,8 +423,11 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         let before = self.scene;
         self.scene = found.map_or(Scene::EMPTY, |fit| fit.scene);
         self.number(&before);
+        self.certainty = self.certainty.filter(|_| is_searched || self.scene.count == before.count);
         let mut answer = self.answer(found, task);
         answer.flags.raise(Flags::MISFIT, is_lost || is_searched && self.pieces >= Self::MOST_PIECES);
+        let is_doubtful = answer.flags.has(Flags::MISFIT) || answer.flags.has(Flags::MORE);
+        answer.certainty = self.certainty.filter(|_| !is_doubtful);
         answer
     }
 }

@@ -21,7 +21,7 @@ use self::changes::Changes;
 pub use self::file::{CompiledTable, TableFileError};
 use self::table::Fitted;
 pub use self::table::{CompileError, compile};
-use crate::solve::answer::{Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
+use crate::solve::answer::{Alternative, Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
 use crate::solve::fit::policy;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
@@ -140,9 +140,13 @@ fn core_says(says: Says) -> CoreSays {
 
 fn solution(answer: &Answer<f64, MOST_CONTACTS>) -> Solution {
     let flags = answer.flags;
+    let other = answer.certainty.and_then(|certainty| certainty.other);
+    let alternative = other.map(|(contacts, certainty)| Alternative { contacts, certainty });
     Solution {
         contacts: answer.contacts().iter().map(found).collect(),
         residual: Some(answer.residual),
+        certainty: answer.certainty.map(|certainty| certainty.share),
+        alternative: alternative.filter(|other| other.certainty >= policy::named_share()),
         flags: Flags {
             saturated: flags.has(CoreFlags::SATURATED),
             misfit: flags.has(CoreFlags::MISFIT) || flags.has(CoreFlags::MORE),
