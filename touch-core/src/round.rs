@@ -8,7 +8,7 @@ use crate::births::Births;
 use crate::circuit::{Circuit, Spot};
 use crate::evidence::{known, ln_volume};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
-use crate::frame::left_v;
+use crate::frame::{Errors, left_v};
 use crate::held::{Held, Kept, Parts, Room};
 use crate::normal::Normal;
 use crate::real::Real;
@@ -31,6 +31,8 @@ const LEAST_SHARE: f32 = 0.2;
 const WORTH: f32 = 0.8;
 /// How far contacts move, in usual radii and as logarithms, before patterns are taken anew. Of 240 scenes on `built205` as many are right, but for two, with 0.1 and with 1.
 const NEAR: f32 = 0.5;
+/// Share by which the variance of noise may be another in the next frame for patterns to be held on: with it, one in the weight of readings changes nothing that is told.
+const ALIKE: f32 = 0.05;
 
 /// Where a fit on a detector that is not known is.
 #[derive(Clone, Copy, Debug)]
@@ -45,11 +47,34 @@ pub(crate) struct OnUnknown<T, const D: usize> {
     /// Directions whose patterns are held, and whether they are: in what is taken for noise and with that weight.
     pub kept: Kept<D>,
     pub is_held: bool,
+    /// Variance of a reading's noise in the frame that they are of (V2), and whether all its readings say something.
+    variance_v2: T,
+    is_whole: bool,
 }
 
 impl<T: Real, const D: usize> OnUnknown<T, D> {
-    pub const NONE: Self =
-        Self { tau: T::ONE, left: T::ZERO, prior: T::ZERO, damping: T::ONE, kept: Kept::NONE, is_held: false };
+    pub const NONE: Self = Self {
+        tau: T::ONE,
+        left: T::ZERO,
+        prior: T::ZERO,
+        damping: T::ONE,
+        kept: Kept::NONE,
+        is_held: false,
+        variance_v2: T::ZERO,
+        is_whole: false,
+    };
+
+    /// Begins a frame. Patterns are held on if its readings say as much as those of the frame that they are of, in nearly the same noise, which then is taken for it.
+    pub fn begin_frame(&mut self, errors: &mut Errors<T>, readings: usize) {
+        let is_whole = errors.count == readings;
+        let change = errors.variance_v2 / self.variance_v2 - T::ONE;
+        self.is_held &= is_whole && self.is_whole && change.abs() < T::of(ALIKE);
+        self.is_whole = is_whole;
+        match self.is_held {
+            true => errors.variance_v2 = self.variance_v2,
+            false => self.variance_v2 = errors.variance_v2,
+        }
+    }
 
     fn objective(&self) -> T {
         self.left / (self.tau * self.tau) + self.prior

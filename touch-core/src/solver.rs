@@ -237,12 +237,13 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             // Pads are among what is not known.
             errors.pads.fill(T::ZERO);
         }
+        if self.stage == Stage::Idle {
+            self.fitting.on.begin_frame(&mut errors, frame.volts.len());
+        }
         let task = Task { table, frame: &frame, errors: &errors, unknown };
         if self.stage == Stage::Idle {
             (self.stage, self.work) = (Stage::Followed, Work::NONE);
             (self.doubted, self.stays) = (None, false);
-            // Its noise, and which readings say something, are others.
-            self.fitting.on.is_held = false;
             self.fit(self.scene, T::of(ANY_RADIUS), FOLLOWING);
         }
         let answer = (0..pieces).find_map(|_| self.go_on(task, means));

@@ -298,3 +298,47 @@ fn contacts_are_found_with_the_detector_that_they_are_on() {
         assert!(again.work.frames.iter().sum::<u32>() < answer.work.frames.iter().sum::<u32>());
     }
 }
+
+/// Patterns are held on from frame to frame, and tell what such that are made anew would; in a frame whose readings say less they are made anew.
+#[test]
+fn patterns_serve_the_frames_after_theirs() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let made_up = MadeUp::new(&table);
+    let unknown = made_up.unknown();
+    let rooms = || {
+        let numbers = std::vec![0.0; Room::<f64>::numbers(&table, &unknown, 3)];
+        (numbers, std::vec![0.0; Room::<f64>::floats(&table, &unknown, 3)])
+    };
+    let (mut kept, mut other) = (rooms(), rooms());
+    for spots in scenes() {
+        let exact = read_v(&table, &made_up, STEPS, &spots);
+        let mut solver = Solver::<f64, 3, DIRECTIONS>::default();
+        for seed in 0..4 {
+            let exact: Vec<f32> = exact.iter().map(|volts| *volts as f32).collect();
+            let read: Vec<f64> = crate::tests::noisy(&exact, seed).into_iter().map(f64::from).collect();
+            let mut says = std::vec![crate::Says::Voltage; read.len()];
+            if seed == 3 {
+                says[N + 2] = crate::Says::Nothing;
+            }
+            let frame = Frame::new(&read, &says);
+            let mut anew = solver.clone();
+            anew.fitting.on.is_held = false;
+            assert_eq!(solver.fitting.on.is_held, seed > 0);
+            let mut answer = |solver: &mut Solver<f64, 3, DIRECTIONS>, room: &mut (Vec<f64>, Vec<f32>)| {
+                let mut room = Room { numbers: &mut room.0, floats: &mut room.1 };
+                solver.solve_unknown(&table, &unknown, &mut room, &frame).unwrap()
+            };
+            let (held, made) = (answer(&mut solver, &mut kept), answer(&mut anew, &mut other));
+            assert_eq!(held.contacts().len(), spots.len());
+            if seed == 0 || seed == 3 {
+                assert_eq!(held, made);
+            }
+            for (held, made) in held.contacts().iter().zip(made.contacts()) {
+                let off = [(held.x_m - made.x_m) / made.sigma_m[0], (held.y_m - made.y_m) / made.sigma_m[1]];
+                let sigma = held.sigma_m[0] / made.sigma_m[0];
+                assert!(off.iter().all(|off| off.abs() < 0.1) && (sigma - 1.0).abs() < 0.05, "{off:?} {sigma}");
+            }
+        }
+    }
+}
