@@ -400,8 +400,10 @@ fn a_contact_alone_that_went_astray_is_looked_for_anew() {
 /// Shares of numbers of contacts are as their evidence.
 #[test]
 fn how_sure_a_number_is_goes_with_the_evidence() {
-    let sure = crate::Certainty::of(2, 100.0, &[None, Some(100.0), None]);
+    let sure = crate::Certainty::of(3, 100.0, &[None, None, Some(100.0)]);
     assert_eq!((sure.share, sure.other), (1.0, None));
+    let untried = crate::Certainty::of(2, 100.0, &[None, Some(100.0), None]);
+    assert!(untried.share > 0.96 && untried.share < 0.98 && untried.other.is_none(), "{untried:?}");
     let ln_3 = 3f32.ln();
     let unsure = crate::Certainty::of(2, 100.0, &[Some(300.0), Some(100.0), Some(100.0 + 2.0 * ln_3)]);
     let (other, share) = unsure.other.unwrap();
