@@ -81,6 +81,8 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         let deviation = |i: usize, most: T| if of(i, i) >= T::ZERO { of(i, i).sqrt().min(most) } else { most };
         let log_radius = deviation(3, T::of(LN_RADII[1] - LN_RADII[0]));
         let [low_m, high_m] = table.bounds_m();
+        // A mean at a wall may round to what is beyond it.
+        let at_m = [0, 1].map(|d| at_m[d].max(T::of(low_m[d])).min(T::of(high_m[d])));
         let size = [0, 1].map(|d| T::of(high_m[d] - low_m[d]) / radius_m);
         let shift = T::of(table.head().shift_m) / radius_m;
         let [x, y] = [0, 1].map(|i| {

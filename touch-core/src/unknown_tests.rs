@@ -325,7 +325,7 @@ fn patterns_serve_the_frames_after_theirs() {
             let mut anew = solver.clone();
             anew.fitting.on.is_held = false;
             assert_eq!(solver.fitting.on.is_held, seed > 0);
-            let mut answer = |solver: &mut Solver<f64, 3, DIRECTIONS>, room: &mut (Vec<f64>, Vec<f32>)| {
+            let answer = |solver: &mut Solver<f64, 3, DIRECTIONS>, room: &mut (Vec<f64>, Vec<f32>)| {
                 let mut room = Room { numbers: &mut room.0, floats: &mut room.1 };
                 solver.solve_unknown(&table, &unknown, &mut room, &frame).unwrap()
             };
