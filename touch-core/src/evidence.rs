@@ -24,9 +24,8 @@ const CONDUCTANCE_DEVIATION: f32 = 4.0;
 /// as many of 880 scenes are right; with two the model's own error is taken for a light contact beside a wide one in 4 of 112.
 const FEWER_NATS: f32 = 3.0;
 
-/// What one more contact has to gain, in the linear theory, for it to be tried, and what readings have to say for one that is followed (squared deviations): seven for
-/// each number that they determine.
-pub(crate) const MORE_GAIN: f32 = 7.0 * PAID;
+/// What readings have to say for a contact (squared deviations), else it is tried whether the others do as well without it: seven for each number that they determine.
+const PRICE: f32 = 7.0 * PAID;
 /// What readings say for one that is none (squared deviations).
 const NOTHING: f32 = 2.0;
 /// Numbers of a contact that readings determine: a radius that they do not tell says nothing.
@@ -117,7 +116,7 @@ pub(crate) fn better<T: Real, const K: usize, const D: usize>(
 pub(crate) fn weakest<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> Option<usize> {
     let all = &fit.information;
     let least = (0..fit.scene.count).min_by(|a, b| all[*a].total_cmp(&all[*b]))?;
-    (all[least] < T::of(MORE_GAIN)).then_some(least)
+    (all[least] < T::of(PRICE)).then_some(least)
 }
 
 /// Whether the readings do not even tell how strong one contact is to a factor of two: it is none.

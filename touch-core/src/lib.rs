@@ -48,6 +48,8 @@ mod round;
 mod samples;
 mod scan;
 mod search;
+#[cfg(test)]
+mod search_tests;
 mod solver;
 pub mod spline;
 pub mod table;

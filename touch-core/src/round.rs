@@ -31,7 +31,7 @@ const LEAST_SHARE: f32 = 0.2;
 const WORTH: f32 = 0.8;
 /// How far contacts move, in usual radii and as logarithms, before patterns are taken anew. Of 240 scenes on `built205` as many are right, but for two, with 0.1 and with 1.
 const NEAR: f32 = 0.5;
-/// Share by which the variance of noise may be another in the next frame for patterns to be held on: with it, one in the weight of readings changes nothing that is told.
+/// Share by which the variance of noise may differ from that of the frame that patterns were made in for these to be held on.
 const ALIKE: f32 = 0.05;
 
 /// Where a fit on a detector that is not known is.

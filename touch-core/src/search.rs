@@ -106,7 +106,7 @@ pub(crate) struct Search<T, const K: usize, const D: usize> {
     /// The contact that is looked for anew, and how many were.
     contact: u8,
     anew: u8,
-    /// What the best explanation with one, two and up to `K` contacts, fitted to its end, leaves of the [score], of those that were tried.
+    /// Lowest [score] of explanations with one, two and up to `K` contacts, of those that were tried and fitted with any radii.
     by_count: [Option<T>; K],
 }
 
