@@ -9,7 +9,7 @@ use crate::round::OnUnknown;
 use crate::solver::{BOARD_CONTACTS, Task};
 use crate::table::Table;
 use crate::unknown::Detector;
-use crate::vector::Vector;
+use crate::vector::{PARAMETERS, Vector};
 use crate::walls::Across;
 
 /// Longest way in a step, in usual radii, and longest change of a logarithm.
@@ -72,6 +72,26 @@ impl<T: Real, const K: usize, const D: usize> Scene<T, K, D> {
     pub fn without(self, index: usize) -> Self {
         let kept = self.spots().iter().enumerate().filter(|(k, _)| *k != index);
         kept.fold(Self { steps: self.steps, ..Self::EMPTY }, |scene, (_, spot)| scene.with(*spot))
+    }
+
+    /// The step to where contacts leave least, damped, and by how much less that is in the linear theory; those that are at a wall and would go beyond it stay there, and
+    /// the others take the best step with these. `None` where nothing is determined.
+    pub fn step(&self, normal: &Normal<T, K>, damping: T, table: &Table<'_>) -> Option<(Vector<T, K>, T)> {
+        let across = Across::both(table);
+        let is_stopped = |i: &usize, step: &Vector<T, K>| {
+            across[i % PARAMETERS].is_stopped(self.spots[i / PARAMETERS].at_m[i % PARAMETERS], step[*i])
+        };
+        let places = || (0..normal.count).filter(|i| i % PARAMETERS < 2);
+        let (mut step, mut gain) = normal.step(damping)?;
+        if !places().any(|i| is_stopped(&i, &step)) {
+            return Some((step, gain));
+        }
+        let mut free = *normal;
+        while let Some(stopped) = places().find(|i| is_stopped(i, &step)) {
+            free.hold(stopped);
+            (step, gain) = free.step(damping)?;
+        }
+        Some((step, gain))
     }
 
     pub fn moved(&self, step: &Vector<T, K>, table: &Table<'_>) -> Self {
@@ -223,6 +243,11 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     /// What is not known of a detector, and the scene whose patterns are held.
     pub(crate) on: OnUnknown<T, D>,
     pub(crate) held_at: Scene<T, K, D>,
+    /// Whether it goes on from the frame before; the last fit that ended, what was to become least in it, and where its derivatives were taken.
+    pub(crate) goes_on: bool,
+    pub(crate) ended: Fit<T, K, D>,
+    pub(crate) ended_objective: T,
+    pub(crate) gain_at: Scene<T, K, D>,
 }
 
 impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
@@ -239,11 +264,16 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         worth: T::ZERO,
         on: OnUnknown::NONE,
         held_at: Scene::EMPTY,
+        goes_on: false,
+        ended: Fit::NONE,
+        ended_objective: T::ZERO,
+        gain_at: Scene::EMPTY,
     };
 
     /// Begins to step from a scene to where it fits best, so many steps at most.
     pub fn begin(&mut self, scene: Scene<T, K, D>, radius_deviation: T, steps: u8) {
         self.on.is_held &= self.on.damping == T::ONE;
+        self.goes_on = false;
         self.on.damping = T::ONE;
         self.worth = T::of(if steps <= TRYING { ROUGHLY } else { EXACTLY });
         (self.scene, self.trial, self.radius_deviation) = (scene, scene, radius_deviation);
@@ -280,7 +310,11 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             }
         }
         let may_step = self.steps > 0 && self.tries < TRIES;
-        match self.normal.step(self.damping).filter(|(_, gain)| may_step && *gain >= T::of(LEAST_GAIN)) {
+        match self
+            .scene
+            .step(&self.normal, self.damping, task.table)
+            .filter(|(_, gain)| may_step && *gain >= T::of(LEAST_GAIN))
+        {
             Some((step, _)) => {
                 self.trial = self.scene.moved(&step, task.table);
                 Went::On

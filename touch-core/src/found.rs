@@ -2,16 +2,16 @@
 
 use std::vec::Vec;
 
-use crate::fit::{Bench, Fitting, Went};
+use crate::fit::{Bench, Fitting, Scene as AnyScene, Went};
 use crate::frame::Errors;
 use crate::laws::{ALL, solved, summed, tables};
-use crate::normal::ANY_RADIUS;
+use crate::normal::{ANY_RADIUS, Normal};
 use crate::samples::{CELLS, grid_m, table, table_of};
 use crate::scan::{first, no_candidates};
 use crate::solver::Task;
 use crate::tests::{Circuit, Scene, Spot, noisy, spot, volts};
 use crate::unknown::Detector;
-use crate::vector::PARAMETERS;
+use crate::vector::{PARAMETERS, Vector};
 use crate::{Flags, Frame, Says, Solver, Table};
 
 const MOST_PIECES: u32 = <Solver>::MOST_PIECES;
@@ -83,6 +83,28 @@ fn errors_are_those_of_many_draws() {
     }
     // The table has the noise somewhat larger, and a conductance an error of its own.
     assert!(squares[..2].iter().all(|square| (0.15..2.0).contains(square)) && squares[2] < 2.0, "{squares:?}");
+}
+
+/// One that a step would take over the edge stays there, and the other takes the step that is best with that.
+#[test]
+fn a_contact_at_a_wall_does_not_lead_others_astray() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let mut normal = Normal::<f32, 3> { count: 8, ..Normal::EMPTY };
+    (0..8).for_each(|i| normal.matrix[i][i] = 4.0);
+    // The second one's strength goes with the first one's place along x.
+    normal.matrix[6][0] = 3.0;
+    normal.pull = Vector::ZERO;
+    (normal.pull[0], normal.pull[6]) = (2.0, -1.0);
+    let at = |x_m: f32| <AnyScene<f32, 3, 0>>::EMPTY.with(spot(x_m, 0.0, 0.3)).with(spot(0.0, 0.01, 0.3));
+    let [[low_m, _], [high_m, _]] = table.bounds_m();
+    for (x_m, is_free) in [(0.02, true), (high_m, false), (low_m, true)] {
+        let (step, gain) = at(x_m).step(&normal, 0.0, &table).unwrap();
+        let [x, strength] = if is_free { [11.0 / 7.0, -10.0 / 7.0] } else { [0.0, -0.25] };
+        assert!((step[0] - x).abs() < 1e-4 && (step[6] - strength).abs() < 1e-4, "{x_m} {step:?}");
+        assert!((gain - (2.0 * x - strength)).abs() < 1e-4, "{x_m} {gain}");
+        assert!((1..8).filter(|i| *i != 6).all(|i| step[i] == 0.0));
+    }
 }
 
 /// Where something presses over the edge, or where there is no detector.

@@ -54,7 +54,7 @@ impl<T: Real> Room<'_, T> {
 
     pub(crate) fn parts(&mut self, table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> Parts<'_, T> {
         let (moved, mut rest) = self.numbers.split_at_mut(Layout::of(table, unknown).numbers());
-        let [there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left] =
+        let [there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left, read_v] =
             counts(table, unknown, contacts).map(|count| {
                 let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
                 rest = after;
@@ -62,12 +62,13 @@ impl<T: Real> Room<'_, T> {
             });
         let (shares, fields) = self.floats.split_at_mut(unknown.tables);
         let fields = &mut fields[..contacts * unknown.of_place(table.electrodes())];
-        let held = Held { fields, there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left };
+        let held =
+            Held { fields, there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left, read_v };
         Parts { moved, shares, held }
     }
 }
 
-fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 10] {
+fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 11] {
     let (readings, count) = (table.electrodes() * table.electrodes(), unknown.directions.len());
     let parameters = PARAMETERS * contacts;
     [
@@ -80,6 +81,7 @@ fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 
         count,
         parameters * count,
         readings * parameters,
+        readings,
         readings,
     ]
 }
@@ -104,6 +106,8 @@ pub(crate) struct Held<'m, T> {
     /// Of the last look, in noise: derivatives, a row of readings for each parameter, and what is left.
     slopes: &'m mut [T],
     left: &'m mut [T],
+    /// What channels read of contacts at the last look (V).
+    read_v: &'m mut [T],
 }
 
 /// A look in the directions of the patterns.
@@ -209,6 +213,18 @@ impl<T: Real> Held<'_, T> {
         self.left.fill(T::ZERO);
     }
 
+    /// Notes what channels read of contacts (V).
+    pub fn read_v(&mut self) -> &mut [T] {
+        self.read_v
+    }
+
+    /// Notes what that leaves of a frame of which all readings say something, in noise.
+    pub fn leave_of(&mut self, volts: &[T], noise_v: T) {
+        for ((left, volts), read_v) in self.left.iter_mut().zip(volts).zip(&*self.read_v) {
+            *left = (*volts - *read_v) / noise_v;
+        }
+    }
+
     /// Notes a reading, of which so much is left, with its derivatives by the parameters, all in noise.
     pub fn note(&mut self, index: usize, left: T, slope: &[T]) {
         let rows = self.slopes.chunks_exact_mut(self.left.len());
@@ -225,17 +241,16 @@ impl<T: Real> Held<'_, T> {
 
     /// Ends the look at contacts of so many parameters: products of what is left, and of the derivatives, with the patterns are projected.
     pub fn project(&mut self, count: usize, parameters: usize) {
-        let Self { patterns, slopes, left, products: of_left, columns, factor, .. } = self;
+        self.project_left(count);
+        let Self { patterns, slopes, left, columns, factor, .. } = self;
         let readings = left.len();
         let patterns = &patterns[..readings * count];
-        T::products(left, patterns, readings, false, |_, direction, product| of_left[direction] = product);
         T::products(&slopes[..readings * parameters], patterns, readings, false, |which, direction, product| {
             columns[which * count + direction] = product;
         });
         at_once(
             #[inline(always)]
             || {
-                forward(factor, count, &mut of_left[..count]);
                 for column in columns.chunks_exact_mut(count.max(1)).take(parameters) {
                     forward(factor, count, column);
                 }
@@ -243,16 +258,30 @@ impl<T: Real> Held<'_, T> {
         );
     }
 
+    /// The same of what is left alone.
+    pub fn project_left(&mut self, count: usize) {
+        let Self { patterns, left, products, factor, .. } = self;
+        let readings = left.len();
+        let patterns = &patterns[..readings * count];
+        T::products(left, patterns, readings, false, |_, direction, product| products[direction] = product);
+        at_once(
+            #[inline(always)]
+            || forward(factor, count, &mut products[..count]),
+        );
+    }
+
     /// Calls with products of the last look's derivatives, the lower triangle and few besides, and with those of what is left and them.
-    pub fn products(
-        &self,
-        parameters: usize,
-        squares: impl FnMut(usize, usize, T),
-        mut with_left: impl FnMut(usize, T),
-    ) {
+    pub fn products(&self, parameters: usize, squares: impl FnMut(usize, usize, T), with_left: impl FnMut(usize, T)) {
         let readings = self.left.len();
         let slopes = &self.slopes[..readings * parameters];
         T::products(slopes, slopes, readings, true, squares);
+        self.products_with_left(parameters, with_left);
+    }
+
+    /// The latter alone.
+    pub fn products_with_left(&self, parameters: usize, mut with_left: impl FnMut(usize, T)) {
+        let readings = self.left.len();
+        let slopes = &self.slopes[..readings * parameters];
         T::products(self.left, slopes, readings, false, |_, which, product| with_left(which, product));
     }
 

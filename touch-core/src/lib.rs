@@ -36,6 +36,7 @@ mod found;
 mod frame;
 mod head;
 mod held;
+mod kept;
 mod lanes;
 #[cfg(test)]
 mod laws;

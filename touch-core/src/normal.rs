@@ -116,6 +116,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
             let slopes = RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m));
             for e in 0..n {
                 let (index, read_v) = (g * n + e, detector.read_v(e, volts[e]));
+                held.read_v()[index] = read_v;
                 let Some(left_v) = left_v(frame, index, T::of(head.full_v), read_v) else { continue };
                 let mut slope = slopes.of_reading(circuit, head, e, volts[e]);
                 let scale = detector.gain(e, volts[e]) / noise_v;
@@ -132,7 +133,22 @@ impl<T: Real, const K: usize> Normal<T, K> {
         let projected = held.projected(count);
         self.if_known = self.least_if_known(&projected, radius_deviation);
         self.leave_out(&projected);
+        self.leave_out_squares(&projected);
         self.add_known(circuit, radius_deviation);
+    }
+
+    /// The same of what is left now, by the derivatives and patterns that are kept: those of contacts nearby.
+    pub fn sum_up_left(
+        &mut self,
+        circuit: &Circuit<T, K>,
+        radius_deviation: T,
+        (held, count): (&mut Held<'_, T>, usize),
+    ) {
+        held.project_left(count);
+        self.cost = dot(held.left(), held.left());
+        held.products_with_left(self.count, |i, product| self.pull[i] = product);
+        self.leave_out(&held.projected(count));
+        self.add_known_pull(circuit, radius_deviation);
     }
 
     /// Takes what a reading says of strengths, of which it has these derivatives.
@@ -141,7 +157,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
         self.said.iter_mut().zip(by_strength).for_each(|(said, slope)| *said += slope * slope);
     }
 
-    /// Takes what steps of the detector could do as well from all sums.
+    /// Takes what steps of the detector could do as well from the sums with what is left.
     fn leave_out(&mut self, Projected { left, columns, scaled, solved }: &Projected<'_, T>) {
         let count = left.len();
         // `s' s` is `(U'^-1 s)' (U s)`.
@@ -149,9 +165,15 @@ impl<T: Real, const K: usize> Normal<T, K> {
         for i in 0..self.count {
             let column = &columns[i * count..(i + 1) * count];
             self.pull[i] -= dot(column, left) - dot(column, solved);
-            for j in 0..=i {
-                self.matrix[i][j] -= dot(column, &columns[j * count..(j + 1) * count]);
-            }
+        }
+    }
+
+    /// The same from those of the derivatives.
+    fn leave_out_squares(&mut self, Projected { left, columns, .. }: &Projected<'_, T>) {
+        let count = left.len();
+        let column = |i: usize| &columns[i * count..(i + 1) * count];
+        for i in 0..self.count {
+            (0..=i).for_each(|j| self.matrix[i][j] -= dot(column(i), column(j)));
         }
     }
 
@@ -183,9 +205,15 @@ impl<T: Real, const K: usize> Normal<T, K> {
 
     fn add_known(&mut self, circuit: &Circuit<T, K>, radius_deviation: T) {
         let weight = T::ONE / (radius_deviation * radius_deviation);
+        (0..circuit.count).map(|k| PARAMETERS * k + 3).for_each(|i| self.matrix[i][i] += weight);
+        self.add_known_pull(circuit, radius_deviation);
+    }
+
+    fn add_known_pull(&mut self, circuit: &Circuit<T, K>, radius_deviation: T) {
+        let weight = T::ONE / (radius_deviation * radius_deviation);
+        self.known = T::ZERO;
         for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
             let (i, ln_radius) = (PARAMETERS * k + 3, one.spot.ln_radius);
-            self.matrix[i][i] += weight;
             self.pull[i] -= weight * ln_radius;
             self.known += weight * ln_radius * ln_radius;
         }
@@ -215,6 +243,14 @@ impl<T: Real, const K: usize> Normal<T, K> {
         let step = factor.solved(self.pull);
         let gain = (0..self.count).map(|i| step[i] * self.pull[i]).sum();
         Some((step, gain))
+    }
+
+    /// Holds a parameter where it is.
+    pub fn hold(&mut self, parameter: usize) {
+        self.pull[parameter] = T::ZERO;
+        for i in (0..self.count).filter(|i| *i != parameter) {
+            self.matrix[parameter.max(i)][parameter.min(i)] = T::ZERO;
+        }
     }
 
     /// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that

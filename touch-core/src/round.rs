@@ -5,7 +5,7 @@
 //! detector would be bent until it explained it.
 
 use crate::births::Births;
-use crate::circuit::{Circuit, Spot};
+use crate::circuit::Circuit;
 use crate::evidence::{known, ln_volume};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
 use crate::frame::{Errors, left_v};
@@ -16,6 +16,7 @@ use crate::scan::Candidates;
 use crate::solver::Task;
 use crate::table::{MAX_ELECTRODES, Table};
 use crate::unknown::{Detector, Layout, Unknown};
+use crate::vector::{PARAMETERS, Vector};
 
 /// Steps of contacts in a round.
 const INNER: u8 = 2;
@@ -30,7 +31,7 @@ const NOISE: f32 = 1.3;
 const LEAST_SHARE: f32 = 0.2;
 const WORTH: f32 = 0.8;
 /// How far contacts move, in usual radii and as logarithms, before patterns are taken anew. Of 240 scenes on `built205` as many are right, but for two, with 0.1 and with 1.
-const NEAR: f32 = 0.5;
+pub(crate) const NEAR: f32 = 0.5;
 /// Share by which the variance of noise may differ from that of the frame that patterns were made in for these to be held on.
 const ALIKE: f32 = 0.05;
 
@@ -47,6 +48,8 @@ pub(crate) struct OnUnknown<T, const D: usize> {
     /// Directions whose patterns are held, and whether they are: in what is taken for noise and with that weight.
     pub kept: Kept<D>,
     pub is_held: bool,
+    /// Whether derivatives are kept of the last fit, in noise.
+    pub has_gain: bool,
     /// Variance of a reading's noise in the frame that they are of (V2), and whether all its readings say something.
     variance_v2: T,
     is_whole: bool,
@@ -60,6 +63,7 @@ impl<T: Real, const D: usize> OnUnknown<T, D> {
         damping: T::ONE,
         kept: Kept::NONE,
         is_held: false,
+        has_gain: false,
         variance_v2: T::ZERO,
         is_whole: false,
     };
@@ -97,11 +101,11 @@ impl<T: Real, const D: usize> OnUnknown<T, D> {
 }
 
 /// What rounds are gone with.
-struct On<'a, 't, T, const K: usize> {
-    task: Task<'t, T>,
+pub(crate) struct On<'a, 't, T, const K: usize> {
+    pub task: Task<'t, T>,
     unknown: &'t Unknown<'t>,
-    circuit: &'a mut Circuit<T, K>,
-    parts: Parts<'a, T>,
+    pub circuit: &'a mut Circuit<T, K>,
+    pub parts: Parts<'a, T>,
 }
 
 impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
@@ -133,6 +137,18 @@ impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
         }
         Some(sum / errors.variance_v2).filter(|sum| sum.is_finite())
     }
+
+    /// Notes what channels read of a scene; `false` if it makes no sense.
+    pub fn read<const D: usize>(&mut self, scene: &Scene<T, K, D>) -> bool {
+        let n = self.task.table.electrodes();
+        let Some((detector, circuit, held)) = self.solved(scene) else { return false };
+        let mut volts = [T::ZERO; MAX_ELECTRODES];
+        for (g, row) in held.read_v().chunks_exact_mut(n).enumerate() {
+            circuit.row_v(&detector, g, &mut volts);
+            row.iter_mut().enumerate().for_each(|(e, read_v)| *read_v = detector.read_v(e, volts[e]));
+        }
+        true
+    }
 }
 
 /// Squares of what was known of a scene before.
@@ -142,15 +158,24 @@ fn prior<T: Real, const K: usize, const D: usize>(scene: &Scene<T, K, D>, radius
 }
 
 impl<T: Real, const K: usize, const D: usize> Scene<T, K, D> {
-    /// Whether patterns of contacts here serve for those of another scene.
-    fn is_near(&self, other: &Self, table: &Table<'_>) -> bool {
-        let (near, radius_m) = (T::of(NEAR), T::of(table.head().radius_m));
-        let is_near = |(one, other): (&Spot<T>, &Spot<T>)| {
-            let [x, y] = [0, 1].map(|d| (one.at_m[d] - other.at_m[d]) / radius_m);
-            let logs = [one.ln_ohm - other.ln_ohm, one.ln_radius - other.ln_radius];
-            x * x + y * y < near * near && logs.into_iter().all(|log| log.abs() < near)
+    /// Whether patterns of contacts here, and what else is linear near them, serve for those of another scene.
+    pub(crate) fn is_near(&self, other: &Self, table: &Table<'_>) -> bool {
+        let near = T::of(NEAR);
+        let is_near = |[x, y, ln_ohm, ln_radius]: &[T; PARAMETERS]| {
+            *x * *x + *y * *y < near * near && ln_ohm.abs() < near && ln_radius.abs() < near
         };
-        self.count == other.count && self.spots().iter().zip(other.spots()).all(is_near)
+        self.count == other.count && self.ways_from(other, table).0.iter().take(self.count).all(is_near)
+    }
+
+    /// How far contacts are from those of another scene, in usual radii and as logarithms.
+    pub(crate) fn ways_from(&self, other: &Self, table: &Table<'_>) -> Vector<T, K> {
+        let radius_m = T::of(table.head().radius_m);
+        let mut ways = Vector::ZERO;
+        for ((way, one), other) in ways.0.iter_mut().zip(self.spots()).zip(other.spots()) {
+            let [x, y] = [0, 1].map(|d| (one.at_m[d] - other.at_m[d]) / radius_m);
+            *way = [x, y, one.ln_ohm - other.ln_ohm, one.ln_radius - other.ln_radius];
+        }
+        ways
     }
 }
 
@@ -165,6 +190,12 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         work: &mut Working<'_, K>,
     ) -> Went<T, K, D> {
         let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K) };
+        if self.scene.count > 0
+            && core::mem::take(&mut self.goes_on)
+            && let Some(fit) = self.by_kept_gain(&mut on, work)
+        {
+            return Went::ToEnd(Some(fit));
+        }
         if self.scene.count == 0 || !self.is_begun(&mut on) {
             return Went::ToEnd(None);
         }
@@ -236,6 +267,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let Task { table, frame, errors, .. } = task;
         let noise_v = self.on.tau * errors.variance_v2.sqrt();
         let mut at = self.scene;
+        self.on.has_gain = false;
         let (detector, circuit, held) = on.solved(&at)?;
         if !(self.on.is_held && self.held_at.is_near(&at, table)) {
             self.on.hold(task, &detector, circuit, held)?;
@@ -263,7 +295,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             self.steps -= 1;
             let mut is_taken = false;
             for _ in 0..TRIES {
-                let step = self.normal.step(self.damping);
+                let step = at.step(&self.normal, self.damping, table);
                 let Some((step, gain)) = step else {
                     self.is_worse();
                     continue;
@@ -332,7 +364,10 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         self.normal.sum_up_held(&detector, circuit, frame, noise_v, self.radius_deviation, (held, kept.count));
         let steps: T = self.scene.steps.iter().map(|step| *step * *step).sum();
         let volume = T::of(2.0) * ln_volume(table, circuit, &self.normal) - held.ln_determinant(kept.count);
-        Some(Fit {
+        self.on.has_gain = self.on.tau == T::ONE && self.on.is_whole;
+        self.gain_at = self.scene;
+        self.ended_objective = self.normal.objective();
+        self.ended = Fit {
             scene: self.scene,
             cost: self.on.left + steps,
             evidence: volume - self.on.left - self.on.prior,
@@ -341,6 +376,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             less_said: self.normal.less_said(),
             radius_deviation: self.radius_deviation,
             ..Fit::NONE
-        })
+        };
+        Some(self.ended)
     }
 }

@@ -245,6 +245,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             (self.stage, self.work) = (Stage::Followed, Work::NONE);
             (self.doubted, self.stays) = (None, false);
             self.fit(self.scene, T::of(ANY_RADIUS), FOLLOWING);
+            self.fitting.goes_on = true;
         }
         let answer = (0..pieces).find_map(|_| self.go_on(task, means));
         Ok(answer.map(|mut answer| {

@@ -299,7 +299,7 @@ fn contacts_are_found_with_the_detector_that_they_are_on() {
     }
 }
 
-/// Patterns are held on from frame to frame, and tell what such that are made anew would; in a frame whose readings say less they are made anew.
+/// Patterns and derivatives are held on from frame to frame, cost less, and tell what such that are made anew would; in a frame whose readings say less they are made anew.
 #[test]
 fn patterns_serve_the_frames_after_theirs() {
     let bytes = table();
@@ -331,6 +331,8 @@ fn patterns_serve_the_frames_after_theirs() {
             };
             let (held, made) = (answer(&mut solver, &mut kept), answer(&mut anew, &mut other));
             assert_eq!(held.contacts().len(), spots.len());
+            let looks = |answer: &Answer<f64, 3>| answer.work.frames.iter().sum::<u32>();
+            assert!(looks(&held) < looks(&made) || seed == 0 || seed == 3, "{held:?} {made:?}");
             if seed == 0 || seed == 3 {
                 assert_eq!(held, made);
             }

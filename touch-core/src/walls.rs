@@ -125,6 +125,12 @@ impl<T: Real> Across<T> {
         if is_low { self.low_m + distance_m } else { self.high_m - distance_m }
     }
 
+    /// Whether a step from a place leads off the detector at once.
+    pub fn is_stopped(&self, x_m: T, step_m: T) -> bool {
+        let (is_low, from_m) = self.nearer(x_m);
+        from_m <= T::ZERO && if is_low { step_m < T::ZERO } else { step_m > T::ZERO }
+    }
+
     /// What is known of a place that is normal along the tangent, with such a mean from there and such a standard error (m); `None` where no wall is near.
     pub fn told(&self, x_m: T, step_m: T, error_m: T) -> Option<Told<T>> {
         let (is_low, from_m) = self.nearer(x_m);
