@@ -243,11 +243,10 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     /// What is not known of a detector, and the scene whose patterns are held.
     pub(crate) on: OnUnknown<T, D>,
     pub(crate) held_at: Scene<T, K, D>,
-    /// Whether it goes on from the frame before; the last fit that ended, what was to become least in it, and where its derivatives were taken.
+    /// Whether it goes on from the frame before; the last fit whose derivatives were taken where it ended, and what was to become least in it.
     pub(crate) goes_on: bool,
     pub(crate) ended: Fit<T, K, D>,
     pub(crate) ended_objective: T,
-    pub(crate) gain_at: Scene<T, K, D>,
 }
 
 impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
@@ -267,7 +266,6 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         goes_on: false,
         ended: Fit::NONE,
         ended_objective: T::ZERO,
-        gain_at: Scene::EMPTY,
     };
 
     /// Begins to step from a scene to where it fits best, so many steps at most.

@@ -53,11 +53,11 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     /// Whether derivatives are those of contacts of a scene, near enough: where patterns serve too, or within what is known of them.
     fn has_gain_near(&self, scene: &Scene<T, K, D>, on: &On<'_, '_, T, K>) -> bool {
         let table = on.task.table;
-        if scene.is_near(&self.gain_at, table) {
+        if scene.is_near(&self.ended.scene, table) {
             return true;
         }
         let Some(covariance) = self.normal.covariance(&known(table, on.circuit)) else { return false };
-        let ways = scene.ways_from(&self.gain_at, table);
+        let ways = scene.ways_from(&self.ended.scene, table);
         let is_within = |i: usize| ways[i] * ways[i] < T::of(WITHIN * WITHIN) * covariance[i][i];
         (0..self.normal.count).all(|i| ways[i].abs() < T::of(NEAR) || is_within(i))
     }

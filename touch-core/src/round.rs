@@ -365,7 +365,6 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let steps: T = self.scene.steps.iter().map(|step| *step * *step).sum();
         let volume = T::of(2.0) * ln_volume(table, circuit, &self.normal) - held.ln_determinant(kept.count);
         self.on.has_gain = self.on.tau == T::ONE && self.on.is_whole;
-        self.gain_at = self.scene;
         self.ended_objective = self.normal.objective();
         self.ended = Fit {
             scene: self.scene,
