@@ -8,9 +8,10 @@
 use crate::circuit::{Circuit, PerElectrode, Spot};
 use crate::fit::{Working, held_ohm};
 use crate::frame::{Errors, Frame, left_v};
-use crate::normal::{Factor, Normal, Pattern, RowSlopes};
+use crate::normal::{Factor, Normal};
 use crate::real::Real;
 use crate::scan::{APART, Candidate, Candidates, places, take};
+use crate::slopes::{Pattern, RowSlopes};
 use crate::solver::Task;
 use crate::table::{MAX_ELECTRODES, Table};
 use crate::unknown::Detector;

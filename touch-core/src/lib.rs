@@ -51,6 +51,7 @@ mod scan;
 mod search;
 #[cfg(test)]
 mod search_tests;
+mod slopes;
 mod solver;
 pub mod spline;
 pub mod table;

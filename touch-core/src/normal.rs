@@ -1,11 +1,11 @@
 //! Normal equations of contacts, summed up row by row of a frame, and steps by them.
 
-use crate::circuit::{Circuit, Loaded, TURNED};
+use crate::circuit::Circuit;
 use crate::frame::{Errors, Frame, Says, left_v};
-use crate::head::Head;
 use crate::held::{Held, Projected};
 use crate::products::dot;
 use crate::real::Real;
+use crate::slopes::RowSlopes;
 use crate::table::MAX_ELECTRODES;
 use crate::unknown::Detector;
 use crate::vector::{Matrix, PARAMETERS, Vector};
@@ -301,97 +301,6 @@ fn inverse_diagonal<T: Real>(mut covariance: [[T; PARAMETERS]; PARAMETERS]) -> T
         }
     }
     T::ONE / covariance[STRENGTH][STRENGTH].max(T::min_positive_value())
-}
-
-/// What the derivatives by a contact's parameters need of an electrode: numbers that are linear in the electrodes, so that a sum over these will do too.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pattern<T> {
-    current: T,
-    /// Changes of the field at the contact for a step of its place along x and along y, in usual radii, and of its radius' logarithm (ohm).
-    along: [T; 3],
-    driving: [T; 2],
-    turned: [T; TURNED],
-}
-
-impl<T: Real> Pattern<T> {
-    pub const NONE: Self =
-        Self { current: T::ZERO, along: [T::ZERO; 3], driving: [T::ZERO; 2], turned: [T::ZERO; TURNED] };
-
-    /// Of a contact, summed over electrodes by `sum`.
-    pub fn of(one: &Loaded<T>, unit_m: T, sum: impl Fn(&[T]) -> T) -> Self {
-        let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| unit_m * sum(slopes));
-        Self {
-            current: sum(&one.currents),
-            along: [x, y, sum(&one.by_radius_ohm)],
-            driving: one.driving_ohm_per_m.each_ref().map(|driving| sum(driving)),
-            turned: one.sample.turning.each_ref().map(|turning| sum(turning)),
-        }
-    }
-
-    /// Adds so much of another.
-    pub fn add(&mut self, share: T, other: &Self) {
-        self.current += share * other.current;
-        self.along.iter_mut().zip(other.along).for_each(|(sum, along)| *sum += share * along);
-        self.driving.iter_mut().zip(other.driving).for_each(|(sum, driving)| *sum += share * driving);
-        self.turned.iter_mut().zip(other.turned).for_each(|(sum, turned)| *sum += share * turned);
-    }
-
-    /// Derivatives of the impedance between two electrodes by the parameters (ohm): linear in each of both.
-    pub fn changes_ohm(&self, other: &Self, one: &Loaded<T>) -> [T; PARAMETERS] {
-        let both = |a: T, of_a: T, b: T, of_b: T| a * of_b + b * of_a;
-        let moved = |p: usize| both(self.along[p], self.current, other.along[p], other.current);
-        let turned = |t: usize, d: usize| both(self.turned[t], self.driving[d], other.turned[t], other.driving[d]);
-        let driven = T::of(2.0) * (self.driving[0] * other.driving[0] + self.driving[1] * other.driving[1]);
-        let fields = [
-            moved(0) + turned(0, 0) + turned(1, 1),
-            moved(1) + turned(1, 0) + turned(2, 1),
-            -one.ohm * self.current * other.current,
-            moved(2) + turned(3, 0) + turned(4, 1),
-        ];
-        let mut changes = one.half_moment_by.map(|half| -half * driven);
-        changes.iter_mut().zip(fields).for_each(|(change, field)| *change -= field);
-        changes
-    }
-}
-
-/// What the derivatives of a row's readings have in common.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RowSlopes<T, const K: usize> {
-    /// Volts by ohm.
-    pub per_ohm: T,
-    /// Of each contact at the grounded electrode.
-    pub own: [Pattern<T>; K],
-    /// Change of the load by each parameter (ohm).
-    pub own_ohm: Vector<T, K>,
-}
-
-impl<T: Real, const K: usize> RowSlopes<T, K> {
-    pub const NONE: Self = Self { per_ohm: T::ZERO, own: [Pattern::NONE; K], own_ohm: Vector::ZERO };
-
-    /// Of the row of a grounded electrode; places are in `unit_m`.
-    pub fn new(circuit: &Circuit<T, K>, g: usize, drive_v: T, unit_m: T) -> Self {
-        let mut all = Self { per_ohm: -drive_v / circuit.loads_ohm[g], ..Self::NONE };
-        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-            all.own[k] = Pattern::of(one, unit_m, |values| values[g]);
-            let changes_ohm = all.own[k].changes_ohm(&all.own[k], one);
-            all.own_ohm.0[k] = changes_ohm;
-        }
-        all
-    }
-
-    /// Derivatives of an electrode's reading, which is so many volts there, by the parameters (V).
-    fn of_reading(&self, circuit: &Circuit<T, K>, head: &Head, e: usize, volts: T) -> Vector<T, K> {
-        let of_load = T::ONE - volts / T::of(head.drive_v);
-        let mut slope = Vector::ZERO;
-        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-            let pattern = Pattern::of(one, T::of(head.radius_m), |values| values[e]);
-            let changes_ohm = pattern.changes_ohm(&self.own[k], one);
-            for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
-                slope.0[k][i] = self.per_ohm * (change_ohm - of_load * self.own_ohm.0[k][i]);
-            }
-        }
-        slope
-    }
 }
 
 /// Cholesky factor of a damped normal matrix whose diagonal is scaled to one.

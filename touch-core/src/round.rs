@@ -124,17 +124,14 @@ impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
 
     /// Squares of what a scene leaves of the readings, in noise.
     fn left<const D: usize>(&mut self, scene: &Scene<T, K, D>) -> Option<T> {
-        let Task { table, frame, errors, .. } = self.task;
-        let (n, full_v) = (table.electrodes(), T::of(table.head().full_v));
-        let (detector, circuit, _) = self.solved(scene)?;
-        let (mut volts, mut sum) = ([T::ZERO; MAX_ELECTRODES], T::ZERO);
-        for g in 0..n {
-            circuit.row_v(&detector, g, &mut volts);
-            for e in 0..n {
-                let left_v = left_v(frame, g * n + e, full_v, detector.read_v(e, volts[e])).unwrap_or(T::ZERO);
-                sum += left_v * left_v;
-            }
+        if !self.read(scene) {
+            return None;
         }
+        let Task { table, frame, errors, .. } = self.task;
+        let full_v = T::of(table.head().full_v);
+        let all = self.parts.held.read_v().iter().enumerate();
+        let left_v = all.filter_map(|(index, read_v)| left_v(frame, index, full_v, *read_v));
+        let sum: T = left_v.map(|left_v| left_v * left_v).sum();
         Some(sum / errors.variance_v2).filter(|sum| sum.is_finite())
     }
 
