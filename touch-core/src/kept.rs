@@ -29,7 +29,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         if !is_for_these || self.ended.scene.count != self.scene.count {
             return None;
         }
-        self.on.has_gain = false;
+        (self.on.has_gain, on.is_moved) = (false, true);
         let (mut scene, mut normal) = (self.scene, self.normal);
         self.leave(on, &mut normal);
         for left in (0..=STEPS).rev() {

@@ -106,6 +106,8 @@ pub(crate) struct On<'a, 't, T, const K: usize> {
     unknown: &'t Unknown<'t>,
     pub circuit: &'a mut Circuit<T, K>,
     pub parts: Parts<'a, T>,
+    /// Whether the detector stays as it was worked out last.
+    pub is_moved: bool,
 }
 
 impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
@@ -117,7 +119,10 @@ impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
         let table = self.task.table;
         let Parts { moved, shares, held } = &mut self.parts;
         let layout = Layout::of(table, self.unknown);
-        let moved = layout.moved(table, self.unknown, &scene.steps, moved, shares);
+        let moved = match self.is_moved {
+            true => layout.as_moved(moved, shares),
+            false => layout.moved(table, self.unknown, &scene.steps, moved, shares),
+        };
         let detector = Detector { table, moved: Some((self.unknown, moved)) };
         self.circuit.solve(&detector, scene.spots()).then_some((detector, &mut *self.circuit, held))
     }
@@ -186,13 +191,14 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         room: &mut Room<'_, T>,
         work: &mut Working<'_, K>,
     ) -> Went<T, K, D> {
-        let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K) };
+        let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K), is_moved: false };
         if self.scene.count > 0
             && core::mem::take(&mut self.goes_on)
             && let Some(fit) = self.by_kept_gain(&mut on, work)
         {
             return Went::ToEnd(Some(fit));
         }
+        on.is_moved = false;
         if self.scene.count == 0 || !self.is_begun(&mut on) {
             return Went::ToEnd(None);
         }
@@ -237,7 +243,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         best: &mut Candidates<T>,
         work: &mut Working<'_, K>,
     ) {
-        let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K) };
+        let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K), is_moved: false };
         let Some((detector, circuit, held)) = on.solved(&self.scene) else { return };
         let (tau, normal, kept) = (self.on.tau, &self.normal, &self.on.kept);
         let noise_v = tau * task.errors.variance_v2.sqrt();

@@ -243,13 +243,7 @@ impl Layout {
         numbers: &'m mut [T],
         shares: &'m mut [f32],
     ) -> Moved<'m, T> {
-        let mut rest = numbers;
-        let mut part = |count: usize| {
-            let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
-            rest = after;
-            part
-        };
-        let [own, pads, distances, walls, crowding, gains, offsets, bows, last] = self.counts().map(&mut part);
+        let [own, pads, distances, walls, crowding, gains, offsets, bows, last] = self.parts(&mut *numbers);
         own.copy_from_slice(&steps[..self.directions]);
         table.parts([&mut *pads, &mut *distances, &mut *walls]);
         let n = self.electrodes;
@@ -286,20 +280,36 @@ impl Layout {
             *at_itself = there_ohm * crowding[e] + own_ohm * (factor - T::ONE);
             last[e] = own_ohm * factor;
         }
-        let switch_ohm = T::of(table.head().on_resistance_ohm) * last[n].exp();
+        last[n] = T::of(table.head().on_resistance_ohm) * last[n].exp();
+        self.as_moved(numbers, shares)
+    }
+
+    /// What was worked out last.
+    pub fn as_moved<'m, T: Real>(&self, numbers: &'m mut [T], shares: &'m [f32]) -> Moved<'m, T> {
+        let [steps, pads_ohm, distances_ohm, walls, crowding, gains, offsets_v, bows_v, last] = self.parts(numbers);
+        let (own_pads_ohm, switch_ohm) = (&last[..self.electrodes], last[self.electrodes]);
         Moved {
-            steps: own,
+            steps,
             shares,
-            pads_ohm: pads,
-            distances_ohm: distances,
+            pads_ohm,
+            distances_ohm,
             walls,
             gains,
-            offsets_v: offsets,
-            bows_v: bows,
+            offsets_v,
+            bows_v,
             crowding,
-            own_pads_ohm: &last[..n],
+            own_pads_ohm,
             switch_ohm,
         }
+    }
+
+    fn parts<'m, T>(&self, numbers: &'m mut [T]) -> [&'m mut [T]; 9] {
+        let mut rest = numbers;
+        self.counts().map(|count| {
+            let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
+            rest = after;
+            part
+        })
     }
 }
 
