@@ -100,7 +100,7 @@ pub(crate) struct Loaded<T> {
     /// Of its place. Once currents are known, what turns its slopes is, of electrodes, the moment times the derivatives of what drives the couples: of that along x by x,
     /// by y (or of that along y by x), of that along y by y, in usual radii; then of both by the radius' logarithm.
     pub sample: Sample<T>,
-    /// Derivatives of the electrodes' fields by the logarithm of the radius (ohm).
+    /// Derivatives by the logarithm of the radius of the electrodes' fields, and once currents are known of what these make of them (ohm).
     pub by_radius_ohm: PerElectrode<T>,
     /// `Q b` of its place.
     pub walls_ohm: [T; MAX_ELECTRODES + 1],
@@ -258,9 +258,10 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         let mut matrix = [[T::ZERO; K]; K];
         for k in 0..self.count {
             matrix[k][k] = self.loaded[k].ohm;
-            for l in (0..self.count).filter(|l| *l != k) {
-                let (ohm, slope) = self.between(detector, k, l);
-                (matrix[k][l], self.slopes_ohm_per_m[k][l]) = (ohm, slope);
+            for l in 0..k {
+                let (ohm, [at_k, at_l]) = self.between(detector, k, l);
+                (matrix[k][l], matrix[l][k]) = (ohm, ohm);
+                (self.slopes_ohm_per_m[k][l], self.slopes_ohm_per_m[l][k]) = (at_k, at_l);
             }
         }
         self.find_currents(detector.table, &matrix) && {
@@ -269,20 +270,20 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         }
     }
 
-    /// Field of contact `l` at contact `k` (ohm), and its derivatives by the place of `k` (ohm/m).
-    fn between(&self, detector: &Detector<'_, T>, k: usize, l: usize) -> (T, [T; 2]) {
-        let (at, from) = (&self.loaded[k], &self.loaded[l]);
+    /// Field between two contacts (ohm), and its derivatives by the place of each of both (ohm/m).
+    fn between(&self, detector: &Detector<'_, T>, k: usize, l: usize) -> (T, [[T; 2]; 2]) {
+        let (one, other) = (&self.loaded[k], &self.loaded[l]);
         let n = detector.table.electrodes();
-        let way_m = [0, 1].map(|d| at.spot.at_m[d] - from.spot.at_m[d]);
-        let distance_m = (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt().max(T::of(1e-9));
-        let (mut ohm, per_m) = detector.by_distance_ohm(distance_m);
-        let mut slope = way_m.map(|way_m| per_m * way_m / distance_m);
-        ohm += from.walls_ohm[n];
+        let (mut ohm, mut slopes) = detector.by_ways_ohm(one.spot.at_m, other.spot.at_m);
+        ohm += other.walls_ohm[n];
         for e in 0..n {
-            ohm += from.walls_ohm[e] * at.sample.value[e];
-            (0..2).for_each(|d| slope[d] += from.walls_ohm[e] * at.sample.slope[d][e]);
+            ohm += other.walls_ohm[e] * one.sample.value[e];
+            for d in 0..2 {
+                slopes[0][d] += other.walls_ohm[e] * one.sample.slope[d][e];
+                slopes[1][d] += one.walls_ohm[e] * other.sample.slope[d][e];
+            }
         }
-        (ohm, slope)
+        (ohm, slopes)
     }
 
     fn find_currents(&mut self, table: &Table<'_>, matrix: &[[T; K]; K]) -> bool {
@@ -344,8 +345,22 @@ impl<T: Real, const K: usize> Circuit<T, K> {
                     self.loaded[k].slopes_ohm_per_m[d][e] = self.loaded[k].sample.slope[d][e] - by_others;
                 }
             }
+            self.take_widened(table, k);
             let n = table.electrodes();
             (0..n).for_each(|e| self.loaded[k].drive(table.head(), n, e));
+        }
+    }
+
+    /// Takes what other contacts' currents change of the field at a contact with its radius from what electrodes do.
+    fn take_widened(&mut self, table: &Table<'_>, k: usize) {
+        let n = table.electrodes();
+        let by_radius_ohm = self.loaded[k].by_radius_ohm;
+        for l in (0..self.count).filter(|l| *l != k) {
+            let ohm: T = (0..n).map(|e| by_radius_ohm[e] * self.loaded[l].walls_ohm[e]).sum();
+            for e in 0..n {
+                let current = self.loaded[l].currents[e];
+                self.loaded[k].by_radius_ohm[e] -= ohm * current;
+            }
         }
     }
 
@@ -396,10 +411,8 @@ impl<T: Real, const K: usize> Circuit<T, K> {
             all_ohm[e] = fields_ohm[e] - self.constant_ohm[e];
         }
         for one in &self.loaded[..self.count] {
-            let way_m = [0, 1].map(|d| at_m[d] - one.spot.at_m[d]);
-            let distance_m = (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt();
             let by_walls: T = (0..n).map(|e| one.walls_ohm[e] * fields_ohm[e]).sum();
-            let ohm = detector.by_distance_ohm(distance_m).0 + by_walls + one.walls_ohm[n];
+            let ohm = detector.by_ways_ohm(at_m, one.spot.at_m).0 + by_walls + one.walls_ohm[n];
             (0..n).for_each(|e| all_ohm[e] -= ohm * one.currents[e]);
         }
     }

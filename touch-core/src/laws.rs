@@ -49,11 +49,11 @@ fn with_one(table: &Table<'_>, at_m: [f32; 2], wide: f32) -> Vec<f64> {
     (0..table.electrodes()).map(|e| f64::from(sample.value[e])).chain([1.0]).collect()
 }
 
-fn between_ohm(table: &Table<'_>, fields: [&[f64]; 2], way_m: f32) -> f64 {
+fn between_ohm(table: &Table<'_>, fields: [&[f64]; 2], [to_m, from_m]: [[f32; 2]; 2]) -> f64 {
     let n = table.electrodes();
     let pairs = (0..=n).flat_map(|s| (0..=n).map(move |t| (s, t)));
     let by_walls: f64 = pairs.map(|(s, t)| fields[0][s] * f64::from(table.walls.of_pair(s, t)) * fields[1][t]).sum();
-    f64::from(Detector::described(table).by_distance_ohm(way_m).0) + by_walls
+    f64::from(Detector::described(table).by_ways_ohm(to_m, from_m).0) + by_walls
 }
 
 /// Readings by Kirchhoff's laws: contacts and couples of currents are nodes, all equations are solved at once.
@@ -68,7 +68,6 @@ fn dense_v(table: &Table<'_>, circuit: &Circuit) -> Vec<f64> {
             (spread_m * spread_m - small * small) / (wide * wide - small * small)
         })
         .collect();
-    let way = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let at = |k: usize, place_m: [f32; 2]| with_one(table, place_m, wides[k]);
     let own = |k: usize| at(k, loaded[k].spot.at_m);
     // Contact currents and the potential of the layer, for 1 A into an electrode.
@@ -80,7 +79,7 @@ fn dense_v(table: &Table<'_>, circuit: &Circuit) -> Vec<f64> {
             (matrix[k][count], matrix[count][k]) = (1.0, 1.0);
             matrix[k][k] = f64::from(loaded[k].ohm);
             for l in (0..count).filter(|l| *l != k) {
-                matrix[k][l] = between_ohm(table, [&own(k), &own(l)], way(loaded[k].spot.at_m, loaded[l].spot.at_m));
+                matrix[k][l] = between_ohm(table, [&own(k), &own(l)], [loaded[k].spot.at_m, loaded[l].spot.at_m]);
             }
         }
         solved(matrix, right)
@@ -94,9 +93,8 @@ fn dense_v(table: &Table<'_>, circuit: &Circuit) -> Vec<f64> {
             place_m[d] += way_m;
             let here = at(k, place_m);
             let others = (0..count).filter(|l| *l != k);
-            let by_others: f64 = others
-                .map(|l| all[e][l] * between_ohm(table, [&here, &own(l)], way(place_m, loaded[l].spot.at_m)))
-                .sum();
+            let by_others: f64 =
+                others.map(|l| all[e][l] * between_ohm(table, [&here, &own(l)], [place_m, loaded[l].spot.at_m])).sum();
             let mut sample = crate::fields::Sample::NONE;
             table.sample(place_m, wides[k], &mut sample);
             here[e] - by_others - 0.5 * all[e][k] * f64::from(sample.value[n])

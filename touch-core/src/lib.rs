@@ -63,6 +63,7 @@ mod unknown;
 mod unknown_tests;
 mod vector;
 mod walls;
+pub mod ways;
 
 pub use self::answer::{Answer, Certainty, Contact, Flags};
 pub use self::contents::Contents;

@@ -14,8 +14,8 @@ use crate::fields::Stencil;
 use crate::lanes::at_once;
 use crate::products::add;
 use crate::real::Real;
-use crate::table::MAX_ELECTRODES;
-use crate::unknown::{Change, Detector, Fields, Knots, Unknown, of_pair, pairs};
+use crate::table::{MAX_ELECTRODES, MAX_KNOTS};
+use crate::unknown::{Change, Detector, Fields, Unknown, of_pair, pairs};
 
 /// The readings of contacts, with what their changes need.
 pub(crate) struct Patterns<'a, T, const K: usize> {
@@ -26,6 +26,8 @@ pub(crate) struct Patterns<'a, T, const K: usize> {
     fields: &'a [f32],
     /// What is there to be read (V), in the readings' order.
     there_v: &'a [T],
+    /// Weights of the coefficients over distances in the field between a contact and one before it.
+    by_ways: [[[T; MAX_KNOTS]; K]; K],
 }
 
 impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
@@ -45,7 +47,13 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
                 || unknown.all_at(n, &Stencil::of(table, one.spot.at_m), row),
             );
         }
-        Self { detector, unknown, circuit, fields, there_v }
+        let mut by_ways = [[[T::ZERO; MAX_KNOTS]; K]; K];
+        for (k, (row, one)) in by_ways.iter_mut().zip(&circuit.loaded).take(circuit.count).enumerate() {
+            for (weights, other) in row.iter_mut().zip(&circuit.loaded).take(k) {
+                *weights = table.by_ways(one.spot.at_m, other.spot.at_m);
+            }
+        }
+        Self { detector, unknown, circuit, fields, there_v, by_ways }
     }
 
     /// Changes of all readings (V) by one deviation in each direction: a row of readings for each; `gains` is room for so many.
@@ -161,15 +169,13 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         }
     }
 
-    /// Change of the field between two contacts by a table (ohm).
+    /// Change of the field between a contact and one before it by a table (ohm).
     #[inline(always)]
-    fn between_ohm(&self, which: usize, contacts: [usize; 2], fields: &[Fields<T>; K]) -> T {
+    fn between_ohm(&self, which: usize, [k, l]: [usize; 2], fields: &[Fields<T>; K]) -> T {
         let (table, n) = (self.detector.table, self.detector.table.electrodes());
-        let [one, other] = contacts.map(|k| &self.circuit.loaded[k]);
-        let way_m = [0, 1].map(|d| one.spot.at_m[d] - other.spot.at_m[d]);
-        let knots = Knots::of(table, (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt());
-        let distances = &self.unknown.distances_ohm[which * table.knots()..];
-        let mut ohm: T = (0..4).map(|i| knots.value[i] * T::of(distances[knots.first + i])).sum();
+        let [one, other] = [k, l].map(|k| &self.circuit.loaded[k]);
+        let distances = &self.unknown.distances_ohm[which * table.knots()..(which + 1) * table.knots()];
+        let mut ohm: T = distances.iter().zip(&self.by_ways[k][l]).map(|(ohm, weight)| *weight * T::of(*ohm)).sum();
         let walls = &self.unknown.walls[which * pairs(n + 1)..(which + 1) * pairs(n + 1)];
         let [here, there] = [one, other].map(|one| &one.sample.value);
         let at = |values: &[T], index: usize| if index < n { values[index] } else { T::ONE };
@@ -185,7 +191,6 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
             }
             ohm += at(there, row) * of_here + at(here, row) * of_there;
         }
-        let [k, l] = contacts;
         for e in 0..n {
             ohm += fields[k].value[e] * other.walls_ohm[e] + fields[l].value[e] * one.walls_ohm[e];
         }

@@ -1,4 +1,4 @@
-//! Tables of made-up detectors, for tests: potentials of a thin sheet between electrodes on a grid, with something of walls.
+//! Tables of made-up detectors, for tests: potentials of a thin sheet between electrodes on a grid, mirrored at its walls once.
 
 extern crate std;
 
@@ -7,12 +7,13 @@ use std::vec::Vec;
 use crate::contents::Contents;
 use crate::crc::crc32;
 use crate::table::{Head, OTHERS, RADII};
+use crate::ways::ways_m;
 
 /// Distance of electrodes (m).
 const PITCH_M: f32 = 0.015;
 /// Cells along a side.
 pub(crate) const CELLS: usize = 20;
-const KNOTS: usize = 12;
+pub(crate) const KNOTS: usize = 15;
 /// Resistance of a square over a turn (ohm).
 const OHM: f32 = 140.0;
 
@@ -28,9 +29,27 @@ pub(crate) fn field_ohm([x, y]: [f32; 2], [to_x, to_y]: [f32; 2]) -> f32 {
     -0.5 * OHM * ((square + 1.6e-5) / 1e-3).ln()
 }
 
-/// Means over the electrodes are taken off.
+/// The walls of the detector with these electrodes: its lowest and highest corner (m).
+fn walls_m(pads_m: &[[f32; 2]]) -> [[f32; 2]; 2] {
+    let half_m = [0, 1].map(|d| pads_m.iter().fold(0.0f32, |most, pad_m| most.max(pad_m[d])) + 0.5 * PITCH_M);
+    [half_m.map(|half_m| -half_m), half_m]
+}
+
+/// What is taken off the field at each distance, so that those by all ways together have about no mean (ohm).
+fn mean_ohm(pads_m: &[[f32; 2]]) -> f32 {
+    let [low_m, high_m] = walls_m(pads_m);
+    field_ohm(low_m.map(|m| 0.75 * m), high_m.map(|m| 0.75 * m))
+}
+
+/// The same with walls.
+fn walled_ohm(pads_m: &[[f32; 2]], at_m: [f32; 2], to_m: [f32; 2]) -> f32 {
+    let mean_ohm = mean_ohm(pads_m);
+    ways_m(at_m, to_m, Some(walls_m(pads_m))).map(|way_m| field_ohm(way_m, [0.0; 2]) - mean_ohm).sum()
+}
+
+/// Of the electrodes, with walls; means over them are taken off.
 pub(crate) fn fields_ohm(pads_m: &[[f32; 2]], at_m: [f32; 2]) -> Vec<f32> {
-    let fields: Vec<_> = pads_m.iter().map(|pad_m| field_ohm(at_m, *pad_m)).collect();
+    let fields: Vec<_> = pads_m.iter().map(|pad_m| walled_ohm(pads_m, at_m, *pad_m)).collect();
     let mean = fields.iter().sum::<f32>() / fields.len() as f32;
     fields.into_iter().map(|ohm| ohm - mean).collect()
 }
@@ -44,13 +63,12 @@ pub(crate) fn table() -> Vec<u8> {
 pub(crate) fn table_of(pads_m: &[[f32; 2]], mask: &[u8], change: impl Fn(&mut Head)) -> Vec<u8> {
     let n = pads_m.len();
     let sides = [CELLS + 3; 2];
-    let [width_m, height_m] =
-        [0, 1].map(|d| pads_m.iter().fold(0.0f32, |most, pad_m| most.max(2.0 * pad_m[d])) + PITCH_M);
+    let [[left_m, bottom_m], [right_m, top_m]] = walls_m(pads_m);
     let mut head = Head {
-        left_m: -0.5 * width_m,
-        bottom_m: -0.5 * height_m,
-        step_x_m: width_m / CELLS as f32,
-        step_y_m: height_m / CELLS as f32,
+        left_m,
+        bottom_m,
+        step_x_m: (right_m - left_m) / CELLS as f32,
+        step_y_m: (top_m - bottom_m) / CELLS as f32,
         radius_m: 0.0025,
         radii_m: [0.0015, 0.0055],
         near_m: 0.0025,
@@ -74,7 +92,7 @@ pub(crate) fn table_of(pads_m: &[[f32; 2]], mask: &[u8], change: impl Fn(&mut He
     change(&mut head);
     let mut pads_ohm = Vec::new();
     for e in 0..n {
-        pads_ohm.extend((0..=e).map(|g| if e == g { 1000.0 } else { field_ohm(pads_m[e], pads_m[g]) }));
+        pads_ohm.extend((0..=e).map(|g| if e == g { 1000.0 } else { walled_ohm(pads_m, pads_m[e], pads_m[g]) }));
     }
     // Walls: the more the nearer an electrode is to the middle, and something that is the same everywhere.
     let wall = |e: usize, g: usize| match (pads_m.get(e), pads_m.get(g)) {
@@ -84,8 +102,9 @@ pub(crate) fn table_of(pads_m: &[[f32; 2]], mask: &[u8], change: impl Fn(&mut He
     };
     let walls: Vec<_> = (0..=n).flat_map(|e| (0..=e).map(move |g| wall(e, g))).collect();
     let channels: Vec<_> = (0..n).map(|e| [1.0 + 0.01 * e as f32, 0.001 * (e as f32 - 2.0)]).collect();
-    let distances_ohm: Vec<_> =
-        (0..KNOTS).map(|k| -OHM * ((k as f32 - 1.0) * head.ln_step + (head.near_m / 0.032).ln())).collect();
+    let distances_ohm: Vec<_> = (0..KNOTS)
+        .map(|k| -OHM * ((k as f32 - 1.0) * head.ln_step + (head.near_m / 0.032).ln()) - mean_ohm(pads_m))
+        .collect();
     // Of the fields and of the rest, twice.
     let codes: Vec<_> = (0..n).map(|_| [0.0, 0.05]).chain([[100.0, 0.01], [0.5, 1.0 / 65_534.0]]).collect();
     let mut coefficients = Vec::new();

@@ -164,7 +164,7 @@ mod tests {
             let all: f32 =
                 (0..256).map(|i| (scales[i / 16] * frame.touch_v(i)).powi(2)).sum::<f32>() / errors.variance_v2;
             assert_eq!(best.spot.at_m, at_m);
-            assert!((best.spot.ln_ohm - truth.ln_ohm).abs() < 0.02, "{best:?}, {truth:?}");
+            assert!((best.spot.ln_ohm - truth.ln_ohm).abs() < 0.03, "{best:?}, {truth:?}");
             assert!((0.999..1.001).contains(&(best.gain / all)), "{} of {all}", best.gain);
         }
     }

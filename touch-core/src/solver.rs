@@ -427,7 +427,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         self.number(&before);
         self.certainty = self.certainty.filter(|_| is_searched || self.scene.count == before.count);
         let mut answer = self.answer(found, task);
-        answer.flags.raise(Flags::MISFIT, is_lost || is_searched && self.pieces >= Self::MOST_PIECES);
+        answer.flags.raise(Flags::MISFIT, self.was_lost);
         let is_doubtful = answer.flags.has(Flags::MISFIT) || answer.flags.has(Flags::MORE);
         answer.certainty = self.certainty.filter(|_| !is_doubtful);
         answer

@@ -17,7 +17,7 @@
 //! | 24 | 24 f32 | [`Head`], in the order of its fields |
 //! | 120 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
 //! | | 2 n f32 | of each channel the gain, and what it reads too much though at rest it does not show (V) |
-//! | | k f32 | coefficients of the spline `d` of `N` by distance (ohm), over `ln r` |
+//! | | k f32 | coefficients of the spline `d` of `N` by lengths of ways (ohm), over `ln r` |
 //! | | (n + 1)(n + 2) / 2 f32 | `Q`, symmetric, as the fields above (1/ohm, none, ohm) |
 //! | | 2 (n + 2) x 2 f32 | of each quantity, its value at code 0 and the step of a code |
 //! | | ceil((nx - 3)(ny - 3) / 8) bytes | which cells are on the detector: bit `i % 8` of byte `i / 8`, rows of `y`, that of the lowest `x` first |
@@ -29,8 +29,8 @@
 //! square of the radius. Fields are in the gauge in which the electrodes' mean is zero everywhere. A quantity at a
 //! place is a uniform cubic B-spline: the cell `(i, j)` between coefficients `i + 1` and `i + 2` of `x` begins at `left_m + i step_m`.
 //!
-//! Fields between two places are `N(x, y) = d(|x - y|) + b(x)' Q b(y)` with `b = (u, 1)`: a part that is the same everywhere, and one that walls and pads
-//! make, which is smooth.
+//! Fields between two places are `N(x, y) = sum of d over ways + b(x)' Q b(y)` with `b = (u, 1)`: a part that goes by the lengths of the [ways](crate::ways) between
+//! them, of which walls make eight where all cells are on the detector, and one that pads and all else make, which is smooth.
 
 use crate::crc::crc32;
 use crate::head::NUMBERS;
@@ -41,13 +41,13 @@ use crate::spline::interval;
 /// First bytes of a table.
 pub const MAGIC: [u8; 4] = *b"TCtb";
 /// Version of the format.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 /// Most electrodes.
 pub const MAX_ELECTRODES: usize = 32;
 /// Most coefficients along a side.
 pub const MAX_SIDE: usize = 128;
 /// Most coefficients over distances.
-pub const MAX_KNOTS: usize = 64;
+pub const MAX_KNOTS: usize = 32;
 /// Quantities beside the fields of the electrodes: a disc's own field, and its share on the detector.
 pub const OTHERS: usize = 2;
 /// Radii that quantities are stored for.
@@ -127,6 +127,7 @@ pub struct Table<'a> {
     pub(crate) walls: Floats<'a>,
     pub(crate) codes: Floats<'a>,
     pub(crate) mask: &'a [u8],
+    pub(crate) is_rectangle: bool,
     pub(crate) coefficients: &'a [u8],
 }
 
@@ -246,7 +247,8 @@ impl<'a> Table<'a> {
         }
         let mut parts = Parts(bytes);
         parts.bytes(HEAD_BYTES).ok_or_else(cut)?;
-        let table = Self {
+        let cells = (sides[0] - 3) * (sides[1] - 3);
+        let mut table = Self {
             head,
             layout,
             electrodes,
@@ -256,9 +258,12 @@ impl<'a> Table<'a> {
             distances: parts.floats(knots).ok_or_else(cut)?,
             walls: parts.floats((electrodes + 1) * (electrodes + 2) / 2).ok_or_else(cut)?,
             codes: parts.floats(2 * RADII * (electrodes + OTHERS)).ok_or_else(cut)?,
-            mask: parts.bytes(((sides[0] - 3) * (sides[1] - 3)).div_ceil(8)).ok_or_else(cut)?,
+            mask: parts.bytes(cells.div_ceil(8)).ok_or_else(cut)?,
+            is_rectangle: false,
             coefficients: parts.bytes(2 * RADII * sides[0] * sides[1] * (electrodes + OTHERS)).ok_or_else(cut)?,
         };
+        let on_detector: u32 = table.mask.iter().map(|byte| byte.count_ones()).sum();
+        table.is_rectangle = on_detector as usize == cells;
         table.check()
     }
 
@@ -322,6 +327,11 @@ impl<'a> Table<'a> {
     pub fn bounds_m(&self) -> [[f32; 2]; 2] {
         let ([columns, rows], Head { left_m, bottom_m, step_x_m, step_y_m, .. }) = (self.cells(), self.head);
         [[left_m, bottom_m], [left_m + columns as f32 * step_x_m, bottom_m + rows as f32 * step_y_m]]
+    }
+
+    /// The corners of the rectangle whose edges are its walls (m); `None` if part of it is not on the detector.
+    pub(crate) fn walls_m<T: Real>(&self) -> Option<[[T; 2]; 2]> {
+        self.is_rectangle.then(|| self.bounds_m().map(|corner_m| corner_m.map(T::of)))
     }
 
     /// The cell of a place, and the shares of the ways through it.

@@ -12,7 +12,8 @@ use crate::lanes::at_once;
 use crate::products::add;
 use crate::real::Real;
 use crate::spline::{interval, weights};
-use crate::table::{MAX_ELECTRODES, Table};
+use crate::table::{MAX_ELECTRODES, MAX_KNOTS, Table};
+use crate::ways::{turned_ways_m, ways_m};
 
 /// A change that needs no fields, for a step of one deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -361,8 +362,24 @@ impl<'a, T: Real> Detector<'a, T> {
             .map_or(T::ONE, |(unknown, moved)| moved.gains[e] + moved.bows_v[e] * unknown.bow(e, volts)[1])
     }
 
-    /// The part of the field between places that goes by their distance (m): its value (ohm), and its derivative by that (ohm/m).
-    pub fn by_distance_ohm(&self, distance_m: T) -> (T, T) {
+    /// The part of the field between two places that goes by the ways between them: its value (ohm), and its derivatives by each of both (ohm/m).
+    pub fn by_ways_ohm(&self, to_m: [T; 2], from_m: [T; 2]) -> (T, [[T; 2]; 2]) {
+        let (mut ohm, mut slopes) = (T::ZERO, [[T::ZERO; 2]; 2]);
+        for (way_m, turns) in turned_ways_m(to_m, from_m, self.table.walls_m()) {
+            let distance_m = (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt().max(T::of(1e-9));
+            let (part_ohm, per_m) = self.by_distance_ohm(distance_m);
+            ohm += part_ohm;
+            let per_m = per_m / distance_m;
+            for d in 0..2 {
+                slopes[0][d] += per_m * way_m[d];
+                slopes[1][d] += per_m * turns[d] * way_m[d];
+            }
+        }
+        (ohm, slopes)
+    }
+
+    /// What a way adds to that by its length (m): its value (ohm), and its derivative by that (ohm/m).
+    pub(crate) fn by_distance_ohm(&self, distance_m: T) -> (T, T) {
         let at = |k: usize| {
             self.moved.as_ref().map_or_else(|| T::of(self.table.distance_ohm(k)), |(_, moved)| moved.distances_ohm[k])
         };
@@ -389,18 +406,30 @@ fn walled<T: Real>(walls: impl Fn(usize, usize) -> T, fields_ohm: &[T], products
     }
 }
 
+impl Table<'_> {
+    /// Weights of the coefficients over distances in the field between two places.
+    pub(crate) fn by_ways<T: Real>(&self, to_m: [T; 2], from_m: [T; 2]) -> [T; MAX_KNOTS] {
+        let mut all = [T::ZERO; MAX_KNOTS];
+        for [x_m, y_m] in ways_m(to_m, from_m, self.walls_m()) {
+            let knots = Knots::of(self, (x_m * x_m + y_m * y_m).sqrt());
+            all.iter_mut().skip(knots.first).zip(knots.value).for_each(|(sum, weight)| *sum += weight);
+        }
+        all
+    }
+}
+
 /// Coefficients over distances, with their weights.
-pub(crate) struct Knots<T> {
+struct Knots<T> {
     /// The first of four.
-    pub first: usize,
+    first: usize,
     /// Weights in the value, and in the derivative by the distance (1/m).
-    pub value: [T; 4],
+    value: [T; 4],
     slope: [T; 4],
 }
 
 impl<T: Real> Knots<T> {
     /// At a distance (m).
-    pub fn of(table: &Table<'_>, distance_m: T) -> Self {
+    fn of(table: &Table<'_>, distance_m: T) -> Self {
         let [near_m, ln_step] = [table.head.near_m, table.head.ln_step].map(T::of);
         // Nearer than that there is no second contact.
         let distance_m = distance_m.max(near_m);

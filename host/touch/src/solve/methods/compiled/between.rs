@@ -1,20 +1,28 @@
-//! Fields between places: a part that goes by their distance, and one that walls and pads make.
+//! Fields between places: a part that goes by the ways between them, straight and by walls, and one that pads and all else make.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::table::{CompileError, failed};
 use crate::solve::problem::Problem;
+use tactomo_physics::detector::Outline;
 use tactomo_physics::forward::ForwardModel;
 use tactomo_physics::forward::spots::Spot;
 use tactomo_touch_core::spline::{interval, weights};
+use tactomo_touch_core::ways::ways_m;
 
 /// Coefficients over distances.
-const KNOTS: usize = 16;
-/// Places whose fields at each other are fitted, about, and every so many pairs that are.
-const PAIRED: usize = 144;
-const PAIR_STRIDE: usize = 3;
+const KNOTS: usize = 18;
+/// Places spread over a detector whose fields at each other are fitted, for each electrode, and pairs of these for each unknown, about.
+const SPREAD: usize = 9;
+const PAIRS: usize = 10;
+/// Places about each of those whose fields at it are fitted too, up to so many times as far as those are from each other: no two of them are as near as contacts may be.
+const NEAR: usize = 2;
+const NEAR_REACH: f64 = 1.5;
+/// Golden ratio less one.
+const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Share of the diagonal that is added to it where a fit is not determined.
 const RIDGE: f64 = 1e-9;
 
@@ -27,13 +35,35 @@ pub(super) struct Between {
     pub walls: Vec<f64>,
 }
 
-/// Pairs of places, and what fields between them are fitted by.
-pub(super) struct Paired {
-    /// Distance that the spline begins at (m).
+/// The spline over the lengths of ways between places.
+pub(super) struct Ways {
+    /// Distance that it begins at (m).
     pub near_m: f64,
     /// Step of `ln r`.
     pub ln_step: f64,
-    radius_m: f64,
+    /// Lowest and highest corner of a rectangle whose walls there are ways by (m).
+    walls_m: Option<[[f64; 2]; 2]>,
+}
+
+impl Ways {
+    /// Of contacts of a radius on a detector.
+    fn new(outline: &Outline, radius_m: f64) -> Self {
+        let [low_m, high_m] = outline.bounds();
+        // By walls, ways are twice as long.
+        let far_m = 2.0 * (high_m[0] - low_m[0]).hypot(high_m[1] - low_m[1]);
+        let ln_step = (far_m / radius_m).ln() / (KNOTS - 3) as f64;
+        Self { near_m: radius_m, ln_step, walls_m: outline.as_rectangle().map(|_| [low_m, high_m]) }
+    }
+
+    /// Those between two places, in steps of `ln r`.
+    fn steps(&self, to_m: [f64; 2], from_m: [f64; 2]) -> impl Iterator<Item = f64> {
+        ways_m(to_m, from_m, self.walls_m).map(|[x_m, y_m]| (x_m.hypot(y_m) / self.near_m).ln() / self.ln_step)
+    }
+}
+
+/// Pairs of places, and what fields between them are fitted by.
+pub(super) struct Paired {
+    pub ways: Ways,
     places_m: Vec<[f64; 2]>,
     pairs: Vec<[usize; 2]>,
     /// Of each pair, factors of the unknowns: coefficients over distances, and then of the form.
@@ -60,24 +90,22 @@ impl Paired {
     pub fn of(problem: &Problem) -> Result<(Self, Between), CompileError> {
         let radius_m = problem.usual_radius_m();
         let fields = problem.model.spots(radius_m).ok_or_else(|| failed(problem, "the model has no small contacts"))?;
+        let n = problem.detector().electrodes.len();
         let outline = &problem.detector().outline;
-        let places_m: Vec<_> = fields.places_m(PAIRED).into_iter().map(|[x_m, y_m, _]| [x_m, y_m]).collect();
-        let places_m: Vec<_> = places_m.into_iter().filter(|place_m| outline.holds(*place_m)).collect();
-        let distance_m = |[k, l]: [usize; 2]| (places_m[k][0] - places_m[l][0]).hypot(places_m[k][1] - places_m[l][1]);
-        let pairs = (0..places_m.len()).flat_map(|k| (0..k).map(move |l| [k, l]));
-        let pairs: Vec<_> = pairs.step_by(PAIR_STRIDE).filter(|pair| distance_m(*pair) >= radius_m).collect();
-        let [low_m, high_m] = outline.bounds();
-        let far_m = (high_m[0] - low_m[0]).hypot(high_m[1] - low_m[1]);
-        let ln_step = (far_m / radius_m).ln() / (KNOTS - 3) as f64;
+        let spread_m = fields.places_m(SPREAD * n).into_iter().map(|[x_m, y_m, _]| [x_m, y_m]);
+        let spread_m: Vec<_> = spread_m.filter(|place_m| outline.holds(*place_m)).collect();
+        let unknowns = KNOTS + (n + 1) * (n + 2) / 2;
+        let (places_m, pairs) = paired(spread_m, outline, radius_m, PAIRS * unknowns);
+        let ways = Ways::new(outline, radius_m);
         let sampled = Sampled::of(&*problem.model, radius_m, &places_m, &pairs)
             .ok_or_else(|| failed(problem, "the model has no small contacts"))?;
         let scale_ohm = sampled.fields_ohm.iter().flatten().fold(0.0f64, |most, ohm| most.max(ohm.abs()));
         let bases: Vec<_> = sampled.fields_ohm.iter().map(|fields| basis(fields, scale_ohm)).collect();
-        let n = problem.detector().electrodes.len();
-        let mut design = DMatrix::zeros(pairs.len(), KNOTS + (n + 1) * (n + 2) / 2);
+        let mut design = DMatrix::zeros(pairs.len(), unknowns);
         let mut row = vec![0.0; design.ncols()];
         for (index, pair) in pairs.iter().enumerate() {
-            equation((distance_m(*pair) / radius_m).ln() / ln_step, pair.map(|k| &bases[k][..]), &mut row);
+            let [to_m, from_m] = pair.map(|k| places_m[k]);
+            equation(ways.steps(to_m, from_m), pair.map(|k| &bases[k][..]), &mut row);
             design.row_mut(index).iter_mut().zip(&row).for_each(|(to, from)| *to = *from);
         }
         let mut matrix = design.transpose() * &design;
@@ -85,9 +113,7 @@ impl Paired {
         let factor =
             Cholesky::new(matrix).ok_or_else(|| failed(problem, "places do not determine what is between them"))?;
         let mut paired = Self {
-            near_m: radius_m,
-            ln_step,
-            radius_m,
+            ways,
             places_m,
             pairs,
             design,
@@ -106,7 +132,7 @@ impl Paired {
         let mut between_ohm = DVector::zeros(self.pairs.len());
         let mut fields_ohm: Vec<Vec<f64>> = self.fields_ohm.iter().map(|fields| vec![0.0; fields.len()]).collect();
         for (share, model) in parts {
-            let sampled = Sampled::of(&**model, self.radius_m, &self.places_m, &self.pairs)?;
+            let sampled = Sampled::of(&**model, self.ways.near_m, &self.places_m, &self.pairs)?;
             between_ohm += sampled.between_ohm * *share;
             for (sums, fields) in fields_ohm.iter_mut().zip(&sampled.fields_ohm) {
                 sums.iter_mut().zip(fields).for_each(|(sum, ohm)| *sum += share * ohm);
@@ -167,14 +193,83 @@ fn basis(fields_ohm: &[f64], scale_ohm: f64) -> Vec<f64> {
     fields_ohm.iter().map(|ohm| ohm / scale_ohm).chain([1.0]).collect()
 }
 
-/// Factors of the unknowns, coefficients over distances and then of the form, in the field between two places so many steps of `ln r` apart.
-fn equation(steps: f64, [a, b]: [&[f64]; 2], row: &mut [f64]) {
+/// Places and pairs of them: of those that are spread, about so many, and of each with some that are near.
+fn paired(spread_m: Vec<[f64; 2]>, outline: &Outline, least_m: f64, count: usize) -> (Vec<[f64; 2]>, Vec<[usize; 2]>) {
+    let spread = spread_m.len();
+    let stride = (spread * spread.saturating_sub(1) / 2 / count).max(1);
+    let all = (0..spread).flat_map(|k| (0..k).map(move |l| [k, l]));
+    let mut pairs: Vec<_> = all.step_by(stride).collect();
+    let [low_m, high_m] = outline.bounds();
+    let apart_m = ((high_m[0] - low_m[0]) * (high_m[1] - low_m[1]) / spread.max(1) as f64).sqrt();
+    let ln_reach = (NEAR_REACH * apart_m / least_m).ln().max(0.0);
+    let mut places_m = spread_m;
+    for index in 0..NEAR * spread {
+        // Turned by the golden angle, and as far as the golden ratio spreads them evenly in the logarithm.
+        let turns = index as f64 * GOLDEN;
+        let (way_m, angle) = (least_m * (ln_reach * (7.0 * turns).fract()).exp(), TAU * turns);
+        let [x_m, y_m] = places_m[index / NEAR];
+        let near_m = [x_m + way_m * angle.cos(), y_m + way_m * angle.sin()];
+        if outline.holds(near_m) {
+            pairs.push([places_m.len(), index / NEAR]);
+            places_m.push(near_m);
+        }
+    }
+    pairs.retain(|[k, l]| (places_m[*k][0] - places_m[*l][0]).hypot(places_m[*k][1] - places_m[*l][1]) >= least_m);
+    (places_m, pairs)
+}
+
+/// Factors of the unknowns, coefficients over distances and then of the form, in the field between two places with ways of so many steps of `ln r` between them.
+fn equation(ways: impl Iterator<Item = f64>, [a, b]: [&[f64]; 2], row: &mut [f64]) {
     row.fill(0.0);
-    let (first, t) = interval(steps, KNOTS - 3);
-    weights(t).value.iter().enumerate().for_each(|(i, weight)| row[first + i] = *weight);
+    for steps in ways {
+        let (first, t) = interval(steps, KNOTS - 3);
+        weights(t).value.iter().enumerate().for_each(|(i, weight)| row[first + i] += *weight);
+    }
     let pairs = (0..a.len()).flat_map(|s| (0..=s).map(move |t| (s, t)));
     for (factor, (s, t)) in row.iter_mut().skip(KNOTS).zip(pairs) {
         let product = a[s] * b[t] + a[t] * b[s];
         *factor = if s == t { 0.5 * product } else { product };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_physics::detector::Detector;
+
+    /// Near and far, in the middle and at walls, also where electrodes are many and the layer is thin.
+    #[test]
+    fn fields_between_places_are_the_models() {
+        for name in ["square-60", "display-140x70"] {
+            let problem = Problem::of(&Detector::preset(name).unwrap()).unwrap();
+            let (paired, between) = Paired::of(&problem).unwrap();
+            let outline = &problem.detector().outline;
+            let [low_m, high_m] = outline.bounds();
+            let (mut places_m, mut pairs) = (Vec::new(), Vec::new());
+            let mut random = fastrand::Rng::with_seed(7);
+            while pairs.len() < 400 {
+                let at_m = [0, 1].map(|d| low_m[d] + random.f64() * (high_m[d] - low_m[d]));
+                let (way_m, angle) = (paired.ways.near_m * 20f64.powf(random.f64()), TAU * random.f64());
+                let to_m = [at_m[0] + way_m * angle.cos(), at_m[1] + way_m * angle.sin()];
+                if outline.holds(to_m) {
+                    pairs.push([places_m.len(), places_m.len() + 1]);
+                    places_m.extend([at_m, to_m]);
+                }
+            }
+            let sampled = Sampled::of(&*problem.model, paired.ways.near_m, &places_m, &pairs).unwrap();
+            let all: Vec<_> = between.distances.iter().chain(&between.walls).collect();
+            let mut row = vec![0.0; all.len()];
+            let (mut off, mut square) = (0.0, 0.0);
+            for (pair, exact_ohm) in pairs.iter().zip(sampled.between_ohm.iter()) {
+                let [to_m, from_m] = pair.map(|k| places_m[k]);
+                let bases = pair.map(|k| basis(&sampled.fields_ohm[k], 1.0));
+                equation(paired.ways.steps(to_m, from_m), bases.each_ref().map(|basis| &basis[..]), &mut row);
+                let ohm: f64 = row.iter().zip(&all).map(|(factor, value)| factor * **value).sum();
+                off += (ohm - exact_ohm).powi(2);
+                square += exact_ohm.powi(2);
+            }
+            let share = (off / square).sqrt();
+            assert!(share < 0.025, "{name}: {share}");
+        }
     }
 }

@@ -284,7 +284,7 @@ fn table_of(
 fn of_driving_sheet(detector: &Detector, paired: &Paired) -> Table {
     let n = detector.electrodes.len();
     let drop = |a: [f64; 2], b: [f64; 2]| {
-        let contacts = [a, b].map(|[x_m, y_m]| Contact::flat(x_m, y_m, paired.near_m, 1.0));
+        let contacts = [a, b].map(|[x_m, y_m]| Contact::flat(x_m, y_m, paired.ways.near_m, 1.0));
         sheet_drops_ohm(detector, &contacts)[(0, 1)]
     };
     Table { fields_ohm: None, pads_ohm: DMatrix::zeros(n, n), between: paired.of_function(drop) }
