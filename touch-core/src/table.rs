@@ -329,8 +329,8 @@ impl<'a> Table<'a> {
         [[left_m, bottom_m], [left_m + columns as f32 * step_x_m, bottom_m + rows as f32 * step_y_m]]
     }
 
-    /// The corners of the rectangle whose edges are its walls (m); `None` if part of it is not on the detector.
-    pub(crate) fn walls_m<T: Real>(&self) -> Option<[[T; 2]; 2]> {
+    /// Lowest and highest corner of the rectangle whose edges are its walls (m); `None` if the middle of a cell is not on the detector.
+    pub fn walls_m<T: Real>(&self) -> Option<[[T; 2]; 2]> {
         self.is_rectangle.then(|| self.bounds_m().map(|corner_m| corner_m.map(T::of)))
     }
 

@@ -1,7 +1,7 @@
 //! Ways between two places: the straight one, and those by the walls of a rectangle.
 //!
-//! No current flows across a wall. So the field of a contact is that of a layer without end with contacts mirrored at the walls and at the corners (method of images). Of
-//! the mirrors' mirrors there are no end; they are far off, and what they add is smooth.
+//! No current flows across a wall. So the field of a contact is that of a layer without end with contacts mirrored at the walls and at the corners (method of images). Mirrors
+//! of mirrors are far off, and what they add is smooth.
 
 use crate::real::Real;
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::splines::Grid;
 use super::table::{CompileError, failed};
 use crate::solve::problem::Problem;
 use tactomo_physics::detector::Outline;
@@ -41,18 +42,20 @@ pub(super) struct Ways {
     pub near_m: f64,
     /// Step of `ln r`.
     pub ln_step: f64,
-    /// Lowest and highest corner of a rectangle whose walls there are ways by (m).
-    walls_m: Option<[[f64; 2]; 2]>,
+    /// Lowest and highest corner of a rectangle whose walls there are ways by (m), by the rule of [`Table`](tactomo_touch_core::Table).
+    pub walls_m: Option<[[f64; 2]; 2]>,
 }
 
 impl Ways {
-    /// Of contacts of a radius on a detector.
-    fn new(outline: &Outline, radius_m: f64) -> Self {
+    /// On a problem's detector.
+    pub fn of(problem: &Problem) -> Self {
+        let (outline, radius_m) = (&problem.detector().outline, problem.usual_radius_m());
         let [low_m, high_m] = outline.bounds();
         // By walls, ways are twice as long.
         let far_m = 2.0 * (high_m[0] - low_m[0]).hypot(high_m[1] - low_m[1]);
         let ln_step = (far_m / radius_m).ln() / (KNOTS - 3) as f64;
-        Self { near_m: radius_m, ln_step, walls_m: outline.as_rectangle().map(|_| [low_m, high_m]) }
+        let is_rectangle = Grid::of(problem).on_detector(outline).all(|is_on| is_on);
+        Self { near_m: radius_m, ln_step, walls_m: is_rectangle.then_some([low_m, high_m]) }
     }
 
     /// Those between two places, in steps of `ln r`.
@@ -96,7 +99,7 @@ impl Paired {
         let spread_m: Vec<_> = spread_m.filter(|place_m| outline.holds(*place_m)).collect();
         let unknowns = KNOTS + (n + 1) * (n + 2) / 2;
         let (places_m, pairs) = paired(spread_m, outline, radius_m, PAIRS * unknowns);
-        let ways = Ways::new(outline, radius_m);
+        let ways = Ways::of(problem);
         let sampled = Sampled::of(&*problem.model, radius_m, &places_m, &pairs)
             .ok_or_else(|| failed(problem, "the model has no small contacts"))?;
         let scale_ohm = sampled.fields_ohm.iter().flatten().fold(0.0f64, |most, ohm| most.max(ohm.abs()));

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use tactomo_physics::algebra::{Factor, Plan};
+use tactomo_physics::detector::Outline;
 use tactomo_touch_core::spline::{interval, weights};
 use tactomo_touch_core::table::MAX_SIDE;
 
@@ -48,6 +49,13 @@ impl Grid {
     /// A place by cells from the lowest corner (m).
     pub fn place_m(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.low_m[0] + x * self.step_m[0], self.low_m[1] + y * self.step_m[1]]
+    }
+
+    /// Whether the middle of each cell is on a detector: in rows of y.
+    pub fn on_detector(&self, outline: &Outline) -> impl Iterator<Item = bool> {
+        let [columns, rows] = self.cells;
+        let middles = (0..rows).flat_map(move |j| (0..columns).map(move |i| [i as f64 + 0.5, j as f64 + 0.5]));
+        middles.map(|middle| outline.holds(self.place_m(middle)))
     }
 
     /// Coefficients with their weights at a place.

@@ -229,9 +229,8 @@ impl Code {
 fn mask(problem: &Problem, grid: &Grid) -> Vec<u8> {
     let [columns, rows] = grid.cells;
     let mut bytes = vec![0; (columns * rows).div_ceil(8)];
-    for index in 0..columns * rows {
-        let middle_m = grid.place_m([(index % columns) as f64 + 0.5, (index / columns) as f64 + 0.5]);
-        bytes[index / 8] |= u8::from(problem.detector().outline.holds(middle_m)) << (index % 8);
+    for (index, is_on) in grid.on_detector(&problem.detector().outline).enumerate() {
+        bytes[index / 8] |= u8::from(is_on) << (index % 8);
     }
     bytes
 }

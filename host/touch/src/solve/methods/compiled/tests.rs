@@ -1,6 +1,7 @@
+use super::between::Ways;
 use super::*;
 use crate::solve::pipeline::method::Method;
-use tactomo_physics::detector::{ConverterErrors, Detector, ForceLaw, Parameter, Tolerances, electrode_grid};
+use tactomo_physics::detector::{ConverterErrors, Detector, ForceLaw, Outline, Parameter, Tolerances, electrode_grid};
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::scene::Contact as Disc;
 use tactomo_physics::simulate::{Noise, drawn, measured};
@@ -249,6 +250,22 @@ fn tables_are_of_a_layout_and_of_a_size() {
     other.electrodes[3].x_m -= 1e-3;
     other.layers[0].thickness_m *= 1.01;
     assert_eq!(layout(&square), layout(&table(&other)), "what is calibrated is of the same layout");
+}
+
+/// Who fits a table and who reads it mirror contacts at the same walls, whatever the outline: also at cut corners that no middle of a cell is in.
+#[test]
+fn tables_are_read_with_the_walls_that_they_are_fitted_with() {
+    for (cut_m, has_walls) in [(0.0, true), (0.0005, true), (0.006, false)] {
+        let (half_m, inner_m) = (0.03, 0.03 - cut_m);
+        let mut outer =
+            vec![[-half_m, -half_m], [half_m, -half_m], [half_m, inner_m], [inner_m, half_m], [-half_m, half_m]];
+        outer.dedup();
+        let outline = Outline { outer, holes: Vec::new() };
+        let problem = Problem::of(&Detector { outline, ..detector() }).unwrap();
+        let bytes = compile(&problem).unwrap();
+        let walls_m = Table::read(&bytes).unwrap().walls_m::<f64>();
+        assert_eq!((walls_m.is_some(), Ways::of(&problem).walls_m.is_some()), (has_walls, has_walls), "{cut_m}");
+    }
 }
 
 #[test]
