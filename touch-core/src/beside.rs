@@ -189,7 +189,7 @@ impl<T: Real, const K: usize> Beside<'_, '_, T, K> {
                 let gain = self.weight * along * along / square;
                 take(
                     best,
-                    Candidate { spot: Spot { at_m, ln_ohm, ln_radius: T::ZERO }, gain },
+                    Candidate { spot: Spot { at_m, ln_ohm, ln_radius: T::ZERO }, gain, half_of: None },
                     T::of(APART) * T::of(head.radius_m),
                 );
             }

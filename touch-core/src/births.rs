@@ -3,6 +3,8 @@
 //! As [`beside`](crate::beside), with what is not known of the detector in the covariance: the residual is whitened, and freed of what the detector's steps explain; the square
 //! of what a contact at a place would change is less what steps and contacts could do as well. That is worked out for those places only that would explain most without it.
 
+use core::f32::consts::FRAC_1_SQRT_2;
+
 use crate::circuit::{Circuit, Spot};
 use crate::fit::{Working, held_ohm};
 use crate::held::{Held, Kept};
@@ -19,6 +21,9 @@ use crate::vector::Vector;
 const CLOSELY: usize = 32;
 /// Share of a pattern that is taken for new at least.
 const LEAST_NEW: f32 = 2e-4;
+/// Axes that halves of a contact may be along (unit vectors), and how far from where it is they begin at most (usual radii).
+const AXES: [[f32; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [FRAC_1_SQRT_2, FRAC_1_SQRT_2], [FRAC_1_SQRT_2, -FRAC_1_SQRT_2]];
+const FARTHEST_HALF: f32 = 2.0;
 /// Damping of the normal equations in what contacts that are there could do as well.
 const DAMPING: f32 = 1e-3;
 
@@ -74,7 +79,62 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
             let ln_ohm = held_ohm((square / along).max(own_ohm).ln(), table);
             let spot = Spot { at_m: table.middle_m(i, j), ln_ohm, ln_radius: T::ZERO };
             let gain = self.tau * self.tau * along * along / square;
-            take(best, Candidate { spot, gain }, T::of(APART) * T::of(table.head().radius_m));
+            take(best, Candidate { spot, gain, half_of: None }, T::of(APART) * T::of(table.head().radius_m));
+        }
+        // Where much is left, a contact is missing elsewhere.
+        if self.tau == T::ONE {
+            self.look_for_halves(best, change, &factor);
+        }
+    }
+
+    /// Takes contacts of which two halves would explain most of what is left among the best.
+    fn look_for_halves(&mut self, best: &mut Candidates<T>, change: &mut [T], factor: &Factor<T, K>) {
+        let table = self.task.table;
+        let radius_m = T::of(table.head().radius_m);
+        for k in 0..self.circuit.count {
+            let spot = self.circuit.loaded[k].spot;
+            for [x, y] in AXES.map(|axis| axis.map(T::of)) {
+                self.change_by_halves(k, [x, y], change);
+                let along = dot(change, self.held.left());
+                if along <= T::ZERO {
+                    continue;
+                }
+                let square = self.new_square(change, factor);
+                let way_m = (T::of(2.0) * along / square).sqrt().min(T::of(FARTHEST_HALF) * radius_m);
+                let half = |way_m: T| Spot {
+                    at_m: [spot.at_m[0] + way_m * x, spot.at_m[1] + way_m * y],
+                    ln_ohm: held_ohm(spot.ln_ohm + T::of(core::f64::consts::LN_2), table),
+                    ln_radius: spot.ln_radius.min(T::ZERO),
+                };
+                let [one, other] = [half(way_m), half(-way_m)];
+                if [one, other].iter().all(|half| table.holds(half.at_m[0], half.at_m[1])) {
+                    let gain = self.tau * self.tau * along * along / square;
+                    take(best, Candidate { spot: one, gain, half_of: Some((k, other)) }, T::of(APART) * radius_m);
+                }
+            }
+        }
+    }
+
+    /// What half the square of the way to each of two halves of a contact along an axis changes, in noise: the second derivative of the field along it takes the place of
+    /// the field. What a contact's own field and couples make of it is another strength and width, or little.
+    fn change_by_halves(&self, k: usize, [x, y]: [T; 2], change: &mut [T]) {
+        let (table, n) = (self.task.table, self.task.table.electrodes());
+        let drive_v = T::of(table.head().drive_v);
+        let one = &self.circuit.loaded[k];
+        let per_moment = T::ONE / (one.moment_s_m2 * T::of(table.head().radius_m));
+        let bend = |e: usize| {
+            let [xx, xy, yy] = [0, 1, 2].map(|which| per_moment * one.sample.turning[which][e]);
+            x * x * xx + T::of(2.0) * x * y * xy + y * y * yy
+        };
+        let mut bends = [T::ZERO; MAX_ELECTRODES];
+        (0..n).for_each(|e| bends[e] = bend(e));
+        for ((g, row), there_v) in change.chunks_exact_mut(n).enumerate().zip(self.held.there_v().chunks_exact(n)) {
+            let own_ohm = T::of(2.0) * bends[g] * one.currents[g];
+            let per_ohm = drive_v / (self.circuit.loads_ohm[g] * self.noise_v);
+            for (e, value) in row.iter_mut().enumerate() {
+                let ohm = bends[e] * one.currents[g] + bends[g] * one.currents[e];
+                *value = per_ohm * (ohm - (T::ONE - there_v[e] / drive_v) * own_ohm);
+            }
         }
     }
 

@@ -25,6 +25,8 @@ pub(crate) struct Candidate<T> {
     pub spot: Spot<T>,
     /// By how much it would lower the sum of squares, in the linear theory.
     pub gain: T,
+    /// Which contact it would take half of, if any, and where the other half would be.
+    pub half_of: Option<(usize, Spot<T>)>,
 }
 
 /// The best candidates, the best first; those that are not there gain nothing.
@@ -32,7 +34,7 @@ pub(crate) type Candidates<T> = [Candidate<T>; CANDIDATES];
 
 impl<T: Real> Candidate<T> {
     /// One that is not there.
-    pub const NONE: Self = Self { spot: Spot::NONE, gain: T::ZERO };
+    pub const NONE: Self = Self { spot: Spot::NONE, gain: T::ZERO, half_of: None };
 }
 
 /// None at all.
@@ -118,7 +120,7 @@ pub(crate) fn first<T: Real, const K: usize>(
             let ohm = T::of(head.drive_v) * square / along - (mean_pad - T::of(2.0) * sum / T::of(n as u32));
             let spot = Spot { at_m, ln_ohm: held_ohm(ohm.max(own_ohm).ln(), table), ln_radius: T::ZERO };
             let gain = along * along / (square * errors.variance_v2);
-            take(&mut all, Candidate { spot, gain }, T::of(APART) * T::of(head.radius_m));
+            take(&mut all, Candidate { spot, gain, half_of: None }, T::of(APART) * T::of(head.radius_m));
         }
     }
     all

@@ -260,7 +260,8 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                 self.start_above(T::ZERO, false, readings)
             }
             Awaits::Another => {
-                self.more = gain > T::of(FIRST_GAIN);
+                // Halves may gain much by a contact's shape.
+                self.more = self.starts.iter().any(|start| start.half_of.is_none() && start.gain > T::of(FIRST_GAIN));
                 let is_full = self.best.is_some_and(|best| best.scene.count == K);
                 if gain > T::of(TRIED_GAIN) && !is_full {
                     self.start_above(T::of(TRIED_GAIN), true, readings)
@@ -340,7 +341,13 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
             // The detector was bent to explain what a contact is missing for.
             others.scene.steps = [T::ZERO; D];
         }
-        let scene = self.starts.get(number).map_or(others.scene, |start| others.scene.with(start.spot));
+        let scene = self.starts.get(number).map_or(others.scene, |start| {
+            let others = match start.half_of {
+                Some((contact, other_half)) => others.scene.without(contact).with(other_half),
+                None => others.scene,
+            };
+            others.with(start.spot)
+        });
         Wants::Fit(scene, self.radius_deviation(), TRYING)
     }
 

@@ -20,7 +20,9 @@ fn fit(contacts: usize, cost: f32, information: f32) -> Fit {
 
 fn starts(gains: &[f32]) -> Candidates<f32> {
     let mut all = no_candidates();
-    all.iter_mut().zip(gains).for_each(|(one, gain)| *one = Candidate { spot: spot(0.02, 0.01, 1.0), gain: *gain });
+    all.iter_mut()
+        .zip(gains)
+        .for_each(|(one, gain)| *one = Candidate { spot: spot(0.02, 0.01, 1.0), gain: *gain, half_of: None });
     all
 }
 

@@ -343,3 +343,28 @@ fn patterns_serve_the_frames_after_theirs() {
         }
     }
 }
+
+/// Two contacts near to each other, which one in the middle nearly explains, are found from its halves.
+#[test]
+fn a_contact_that_is_two_is_found_to_be() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let made_up = MadeUp::new(&table);
+    let unknown = made_up.unknown();
+    let mut numbers = std::vec![0.0; Room::<f64>::numbers(&table, &unknown, 3)];
+    let mut floats = std::vec![0.0; Room::<f64>::floats(&table, &unknown, 3)];
+    let mut told = 0;
+    for which in 0..24u32 {
+        let angle = 0.26 * f64::from(which);
+        let [x_m, y_m] = [0.0034 * angle.cos(), 0.0034 * angle.sin()];
+        let pair = [spot(0.003 + x_m, -0.009 + y_m, 0.4), spot(0.003 - x_m, -0.009 - y_m, 0.4)];
+        let exact: Vec<f32> = read_v(&table, &made_up, STEPS, &pair).into_iter().map(|volts| volts as f32).collect();
+        let read: Vec<f64> = crate::tests::noisy(&exact, which).into_iter().map(f64::from).collect();
+        let says = std::vec![crate::Says::Voltage; read.len()];
+        let mut room = Room { numbers: &mut numbers, floats: &mut floats };
+        let mut solver = Solver::<f64, 3, DIRECTIONS>::default();
+        let answer = solver.solve_unknown(&table, &unknown, &mut room, &Frame::new(&read, &says)).unwrap();
+        told += usize::from(answer.contacts().len() == 2);
+    }
+    assert!(told >= 18, "{told} of 24");
+}
