@@ -87,7 +87,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
         }
     }
 
-    /// Takes contacts of which two halves would explain most of what is left among the best.
+    /// Takes among the best the halves of a contact, on both sides of where it is, that would explain most of what is left, which is as little as noise.
     fn look_for_halves(&mut self, best: &mut Candidates<T>, change: &mut [T], factor: &Factor<T, K>) {
         let table = self.task.table;
         let radius_m = T::of(table.head().radius_m);
@@ -108,7 +108,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
                 };
                 let [one, other] = [half(way_m), half(-way_m)];
                 if [one, other].iter().all(|half| table.holds(half.at_m[0], half.at_m[1])) {
-                    let gain = self.tau * self.tau * along * along / square;
+                    let gain = along * along / square;
                     take(best, Candidate { spot: one, gain, half_of: Some((k, other)) }, T::of(APART) * radius_m);
                 }
             }
