@@ -83,6 +83,11 @@ impl Flags {
 /// five contacts, on detectors that are known and as built, that would be sure to 95 % and more without it, 3 in 100 have another number than is there.
 const UNTRIED: f32 = 0.03;
 
+/// What a nat of the evidence for what is told over more contacts counts where what the detector may differ by is fitted: the best of more contacts that a search comes to is
+/// a local minimum oftener than that of as many. Of 504 answers on detectors as built for which more contacts were tried, 71 % are right, and 87 % were claimed with a whole
+/// nat, 68 % with a third. (A power of the likelihood, where that is known roughly: Miller and Dunson, Robust Bayesian inference via coarsening, 2019.)
+const MORE_NAT: f32 = 1.0 / 3.0;
+
 /// How sure it is how many contacts there are, by the evidence for other numbers of them that a search tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certainty<T = f32> {
@@ -93,10 +98,11 @@ pub struct Certainty<T = f32> {
 }
 
 impl<T: Real> Certainty<T> {
-    /// Of so many contacts, whose evidence is `exp(-score / 2)`, against the best with one, two and more of them.
-    pub(crate) fn of(count: usize, score: T, by_count: &[Option<T>]) -> Self {
-        let odds = |other: T| (T::of(0.5) * (score - other)).exp();
-        let tried = by_count.iter().enumerate().map(|(index, other)| (index + 1, other.map_or(T::ZERO, odds)));
+    /// Of so many contacts, whose evidence is `exp(-score / 2)`, against the best with one, two and more of them, on a detector that is known or not.
+    pub(crate) fn of(count: usize, score: T, by_count: &[Option<T>], is_known: bool) -> Self {
+        let nat = |other: usize| if is_known || other < count { T::ONE } else { T::of(MORE_NAT) };
+        let odds = |other: usize, of: T| (T::of(0.5) * nat(other) * (score - of)).exp();
+        let tried = by_count.iter().enumerate().map(|(index, of)| (index + 1, of.map_or(T::ZERO, |of| odds(index + 1, of))));
         let others = || tried.clone().filter(|(other, odds)| *other != count && *odds > T::ZERO);
         let untried = if by_count.get(count).is_some_and(Option::is_none) { T::of(UNTRIED) } else { T::ZERO };
         let share = T::ONE / (T::ONE + untried + others().map(|(_, odds)| odds).sum::<T>());

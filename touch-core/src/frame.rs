@@ -27,6 +27,8 @@ pub struct Frame<'f, T = f32> {
     /// Electrodes that are left out, a bit each, of how many.
     left_out: u32,
     electrodes: usize,
+    /// Standard deviation of a reading by noise (V), if that is not the table's.
+    noise_v: Option<T>,
 }
 
 /// Share of the drive that everything reaches when a broken wire is to be grounded: the host's.
@@ -57,12 +59,17 @@ pub enum FrameError {
 impl<'f, T: Real> Frame<'f, T> {
     /// A frame of voltages (V), with what each says.
     pub fn new(volts: &'f [T], says: &'f [Says]) -> Self {
-        Self { volts, says, left_out: 0, electrodes: 0 }
+        Self { volts, says, left_out: 0, electrodes: 0, noise_v: None }
     }
 
     /// A frame whose readings are all voltages.
     pub fn of_volts(volts: &'f [T]) -> Self {
         Self::new(volts, &[])
+    }
+
+    /// The frame with another noise than a single one has, as the mean of some: its standard deviation (V).
+    pub fn with_noise(self, noise_v: T) -> Self {
+        Self { noise_v: Some(noise_v), ..self }
     }
 
     /// The frame without electrodes whose wires are broken, and which these are: while one is to be grounded, most others rise to the drive, for nothing is
@@ -142,7 +149,8 @@ impl<T: Real> Errors<T> {
             largest_v = largest_v.max(largest_of_row_v);
         }
         let model_v = T::of(head.model_share) * largest_v;
-        errors.variance_v2 = T::of(head.noise_v) * T::of(head.noise_v) + model_v * model_v;
+        let noise_v = frame.noise_v.unwrap_or(T::of(head.noise_v));
+        errors.variance_v2 = noise_v * noise_v + model_v * model_v;
         errors
     }
 

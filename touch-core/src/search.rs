@@ -154,9 +154,9 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         better(self.kept, self.best).or(self.tried).or(at)
     }
 
-    /// How sure the count of what was found is, against other counts that were tried.
-    pub fn certainty(&self, found: &Fit<T, K, D>) -> Certainty<T> {
-        Certainty::of(found.scene.count, score(found), &self.by_count)
+    /// How sure the count of what was found is, against other counts that were tried, on a detector that is known or not.
+    pub fn certainty(&self, found: &Fit<T, K, D>, is_known: bool) -> Certainty<T> {
+        Certainty::of(found.scene.count, score(found), &self.by_count, is_known)
     }
 
     fn note(&mut self, found: &Fit<T, K, D>) {

@@ -177,6 +177,11 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         }
     }
 
+    /// How far the detector is that the last answer makes likely from the table's, in each direction that is not known, in standard deviations.
+    pub fn steps(&self) -> &[T; D] {
+        &self.scene.steps
+    }
+
     /// Whether a frame is being worked on: [`solve_in_pieces`](Self::solve_in_pieces) goes on with it.
     pub fn is_busy(&self) -> bool {
         self.stage != Stage::Idle
@@ -402,7 +407,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     fn found(&mut self, found: Option<Fit<T, K, D>>, task: Task<'_, T>) -> Option<Answer<T, K>> {
         self.search.more &= found.is_some();
         self.searched = found.map_or(T::ZERO, |fit| fit.cost);
-        self.certainty = found.map(|fit| self.search.certainty(&fit));
+        self.certainty = found.map(|fit| self.search.certainty(&fit, task.unknown.is_none()));
         let fits = self.pieces < Self::MOST_PIECES && found.is_none_or(|fit| !is_misfit(&fit, task.readings()));
         self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
         self.wait = if fits { 0 } else { self.patience };

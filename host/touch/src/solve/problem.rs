@@ -15,6 +15,7 @@ use tactomo_physics::threads;
 
 use crate::learned::Learned;
 use crate::solve::before::complete::Completer;
+use crate::solve::methods::compiled::{CompiledDetector, CompiledFields};
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 ///
@@ -53,6 +54,8 @@ pub struct LearnedElsewhere {
 #[derive(Default)]
 struct Unknown {
     made: OnceLock<Option<Nuisance>>,
+    /// Fields of the detector with it.
+    fields: OnceLock<Option<CompiledFields>>,
     /// Whether a thread of its own makes it.
     beside: AtomicBool,
     /// Of a problem through some of the electrodes: where it is had from in next to no time.
@@ -150,6 +153,7 @@ impl Problem {
         let made = move || {
             threads::leave_a_core();
             problem.made_nuisance(threads::cores());
+            problem.made_fields(threads::cores());
         };
         // Without a thread, whoever asks first makes it.
         let thread = thread::Builder::new().name("unknowns".to_owned()).spawn(made);
@@ -171,6 +175,20 @@ impl Problem {
             })
         };
         self.nuisance.made.get_or_init(made).as_ref()
+    }
+
+    /// The detector as measured, compiled with what is not known of it; `None` if it is exact or curved, has too many electrodes or is seen through some of them, and
+    /// as long as that is [made beside](Self::make_nuisance_beside). Else the first call compiles it, which takes about a second with 16 electrodes.
+    pub(crate) fn compiled(&self) -> Option<CompiledDetector> {
+        let made = || self.nuisance.fields.get().and_then(Option::as_ref);
+        let fields = if self.is_made_beside() { made() } else { self.made_fields(threads::cores()) };
+        fields?.measured(self).ok()
+    }
+
+    fn made_fields(&self, cores: usize) -> Option<&CompiledFields> {
+        let is_whole = self.nuisance.seen_of.is_none() && self.made_already().is_some();
+        let made = || is_whole.then(|| CompiledFields::of(self, cores).ok()).flatten();
+        self.nuisance.fields.get_or_init(made).as_ref()
     }
 
     /// Readings that are all voltages: those that were not read, or reached an end of the converter's range, as the linear theory has them

@@ -49,7 +49,7 @@ impl AutoSearch {
         from: Option<&StripFit>,
         mean: &Mean,
     ) -> Option<StripFit> {
-        let finder = self.finder.as_ref().filter(|_| !contacts.is_begun())?;
+        let finder = self.finder.as_ref()?;
         let target = finder.target_of(mean, Some(contacts.error()?)).ok()?;
         // A single contact stands for a line or a ring if it is as wide as may be; else a second one is nearer.
         let may_be = contacts.count() > 1 || finder.is_widest(contacts);

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::between::{Between, Paired};
 use super::splines::Splines;
-use super::table::{CompileError, Fitted};
+use super::table::Fitted;
 use crate::solve::fit::target::PAD_ERROR;
 use crate::solve::problem::Problem;
 use tactomo_physics::detector::{Detector, Parameter};
@@ -19,7 +19,7 @@ use tactomo_physics::threads;
 use tactomo_touch_core::{Change, Direction, Unknown};
 
 /// All that is not known of a detector.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Changes {
     directions: Vec<Direction>,
     changes: Vec<Change>,
@@ -52,21 +52,21 @@ struct Compiled {
 }
 
 impl Changes {
-    /// Of a problem's detector, by what its table is fitted with; `None` if it is known exactly.
+    /// Of a problem's detector, by what its table is fitted with, but for the converters that measure it.
     ///
     /// # Errors
-    /// [`CompileError`] if a detector that is a little different cannot be modelled.
+    /// [`ForwardError`] if a detector that is a little different cannot be modelled.
     pub fn of(
         problem: &Problem,
         Fitted { splines, paired, .. }: &Fitted,
         cores: usize,
-    ) -> Result<Option<Self>, CompileError> {
+    ) -> Result<Self, ForwardError> {
         let detector = problem.detector();
+        let own_pads_ohm = pads_ohm(&*problem.model)?.into_iter().map(|ohm| ohm as f32).collect();
+        let mut all = Self { own_pads_ohm, ..Self::default() };
         let directions = detector.unknowns().directions;
-        let is_known =
-            detector.converters.iter().all(|converter| converter.gain_share == 0.0 && converter.bow_v == 0.0);
-        if directions.is_empty() && is_known {
-            return Ok(None);
+        if directions.is_empty() {
+            return Ok(all);
         }
         let coarse = problem.model.coarse()?.unwrap_or_else(|| Arc::clone(&problem.model));
         let (compiled, sums) = sums_of(&coarse, &directions)?;
@@ -78,12 +78,16 @@ impl Changes {
             tables.push(of_driving_sheet(detector, paired));
             tables.len() - 1
         });
-        let mut all = Self::default();
-        all.write_directions(&directions, &compiled, sheet, &mut tables, detector)?;
+        all.write_directions(&directions, &compiled, sheet, &mut tables, detector);
         all.write_tables(&tables, splines.grid.sides(), detector.electrodes.len());
+        Ok(all)
+    }
+
+    /// With what is not known of the converters that measure the detector; `None` if nothing is.
+    pub fn measured(&self, detector: &Detector) -> Option<Self> {
+        let mut all = self.clone();
         all.add_converters(detector);
-        all.own_pads_ohm = pads_ohm(&*problem.model)?.into_iter().map(|ohm| ohm as f32).collect();
-        Ok(Some(all))
+        Some(all).filter(|all| !all.directions.is_empty())
     }
 
     /// How they are given to the core.
@@ -109,7 +113,7 @@ impl Changes {
         sheet: Option<usize>,
         tables: &mut Vec<Table>,
         detector: &Detector,
-    ) -> Result<(), CompileError> {
+    ) {
         for steps in directions {
             let start = self.changes.len();
             let mut of_fields = Vec::new();
@@ -136,7 +140,6 @@ impl Changes {
             let changes = start..self.changes.len();
             self.directions.push(Direction { table, square: square.filter(|_| is_alone), changes });
         }
-        Ok(())
     }
 
     /// The tables that directions have, in the order in which they are stored.

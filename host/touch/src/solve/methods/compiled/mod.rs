@@ -4,6 +4,7 @@
 
 mod between;
 mod changes;
+mod detector;
 mod file;
 mod splines;
 mod table;
@@ -11,24 +12,21 @@ mod table;
 mod tests;
 mod unknown;
 
-use std::sync::Arc;
-
 use tactomo_touch_core::{
     Answer, Contact, Flags as CoreFlags, Frame, FrameError, Room, Says as CoreSays, Solver as Core, Table,
 };
 
-use self::changes::Changes;
+pub(crate) use self::detector::{CompiledDetector, CompiledFields};
 pub use self::file::{CompiledTable, TableFileError};
-use self::table::Fitted;
 pub use self::table::{CompileError, compile};
 use crate::solve::answer::{Alternative, Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
 use crate::solve::fit::policy;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
-use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::ForceLaw;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::{Readings, Says};
+use tactomo_physics::scene::Contact as Disc;
 use tactomo_physics::threads;
 
 /// Most contacts that it looks for.
@@ -38,14 +36,20 @@ const MOST_DIRECTIONS: usize = 256;
 
 /// `core`: contacts by the board's own search, by a table.
 pub struct Compiled {
-    bytes: Arc<[u8]>,
-    electrodes: usize,
-    drive_v: f64,
+    detector: CompiledDetector,
     core: Box<Core<f64, MOST_CONTACTS, MOST_DIRECTIONS>>,
-    changes: Option<Changes>,
-    /// Where the core works on them.
+    /// Where the core works on what is not known.
     numbers: Vec<f64>,
     floats: Vec<f32>,
+}
+
+/// What explains a frame by itself: contacts, and the detector that they make likely.
+pub(crate) struct FoundAlone {
+    pub contacts: Vec<Disc>,
+    /// In each direction in which the detector may differ, in standard deviations.
+    pub steps: Vec<f64>,
+    /// How sure their number is: its probability, and the likeliest other one; none if they do not explain the frame.
+    pub certainty: Option<(f64, Option<Alternative>)>,
 }
 
 impl Compiled {
@@ -54,36 +58,51 @@ impl Compiled {
     /// # Errors
     /// [`ForwardError`] if it is curved, or there are too many electrodes for a table.
     pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
-        let detector = problem.detector();
-        let refused = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
-        let wrong = |error| match error {
-            CompileError::Model(error) => error,
-            error => refused(with_causes(&error)),
-        };
-        let fitted = Fitted::of(problem).map_err(wrong)?;
-        let bytes = fitted.table_apart(problem).map_err(wrong)?;
-        let table = Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
-        let (electrodes, drive_v) = (detector.electrodes.len(), detector.drive_v);
-        let changes = Changes::of(problem, &fitted, threads::cores()).map_err(wrong)?;
-        let (mut numbers, mut floats) = (Vec::new(), Vec::new());
-        if let Some(changes) = &changes {
-            let unknown = changes.unknown();
-            if unknown.directions.len() > MOST_DIRECTIONS {
-                let count = unknown.directions.len();
-                return Err(refused(format!(
-                    "it may differ in {count} directions; `core` takes {MOST_DIRECTIONS} at most"
-                )));
-            }
-            numbers = vec![0.0; Room::<f64>::numbers(&table, &unknown, MOST_CONTACTS)];
-            floats = vec![0.0; Room::<f64>::floats(&table, &unknown, MOST_CONTACTS)];
-        }
-        Ok(Self { bytes: bytes.into(), electrodes, drive_v, core: Box::default(), changes, numbers, floats })
+        Ok(Self::on(CompiledFields::of(problem, threads::cores())?.measured(problem)?))
     }
 
-    /// A reading as a board can give it (V): none is far beyond its drive.
-    fn held(&self, volts: f64) -> f64 {
-        let most_v = 2.0 * self.drive_v;
-        if volts.is_finite() { volts.clamp(-most_v, most_v) } else { volts }
+    /// On a detector that was compiled.
+    pub(crate) fn on(detector: CompiledDetector) -> Self {
+        let [numbers, floats] = detector.room;
+        Self { core: Box::default(), numbers: vec![0.0; numbers], floats: vec![0.0; floats], detector }
+    }
+
+    /// What explains the mean of some frames, whose noise has such a standard deviation (V), whatever was before.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    pub(crate) fn alone(&mut self, readings: &Readings, noise_v: f64) -> Result<FoundAlone, SolveError> {
+        self.core.reset();
+        let answer = self.answer(readings, Some(noise_v))?;
+        let disc = |of: &Contact<f64>| Disc::flat(of.x_m, of.y_m, of.radius_m, of.conductance_s);
+        Ok(FoundAlone {
+            contacts: answer.contacts().iter().map(disc).collect(),
+            steps: self.core.steps().to_vec(),
+            certainty: answer.certainty.map(|certainty| (certainty.share, alternative(&answer))),
+        })
+    }
+
+    fn answer(&mut self, readings: &Readings, noise_v: Option<f64>) -> Result<Answer<f64, MOST_CONTACTS>, SolveError> {
+        let CompiledDetector { bytes, electrodes, drive_v, changes, .. } = &self.detector;
+        check_count(readings, *electrodes)?;
+        let volts: Vec<_> = readings.volts().iter().map(|volts| held_v(*volts, *drive_v)).collect();
+        let says: Vec<_> = readings.all_say().iter().map(|says| core_says(*says)).collect();
+        let wrong = SolveError::Electrodes { found: readings.electrodes(), expected: *electrodes };
+        // It was read, and checked, when it was compiled.
+        let table = Table::read_again(bytes).map_err(|_| wrong.clone())?;
+        let frame = Frame::new(&volts, &says);
+        let frame = noise_v.map_or(frame, |noise_v| frame.with_noise(noise_v));
+        let answer = match changes {
+            Some(changes) => {
+                let mut room = Room { numbers: &mut self.numbers, floats: &mut self.floats };
+                self.core.solve_unknown(&table, &changes.unknown(), &mut room, &frame)
+            }
+            None => self.core.solve(&table, &frame),
+        };
+        answer.map_err(|error| match error {
+            FrameError::NotFinite { g, e } => SolveError::NotFinite { g, e },
+            _ => wrong,
+        })
     }
 }
 
@@ -93,30 +112,18 @@ impl Solver for Compiled {
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        check_count(readings, self.electrodes)?;
-        let volts: Vec<_> = readings.volts().iter().map(|volts| self.held(*volts)).collect();
-        let says: Vec<_> = readings.all_say().iter().map(|says| core_says(*says)).collect();
-        let wrong = SolveError::Electrodes { found: readings.electrodes(), expected: self.electrodes };
-        // It was read, and checked, when it was compiled.
-        let table = Table::read_again(&self.bytes).map_err(|_| wrong.clone())?;
-        let frame = Frame::new(&volts, &says);
-        let answer = match &self.changes {
-            Some(changes) => {
-                let mut room = Room { numbers: &mut self.numbers, floats: &mut self.floats };
-                self.core.solve_unknown(&table, &changes.unknown(), &mut room, &frame)
-            }
-            None => self.core.solve(&table, &frame),
-        };
-        match answer {
-            Ok(answer) => Ok(solution(&answer)),
-            Err(FrameError::NotFinite { g, e }) => Err(SolveError::NotFinite { g, e }),
-            Err(_) => Err(wrong),
-        }
+        Ok(solution(&self.answer(readings, None)?))
     }
 
     fn reset(&mut self) {
         self.core.reset();
     }
+}
+
+/// A reading as a board can give it (V): none is far beyond its drive.
+fn held_v(volts: f64, drive_v: f64) -> f64 {
+    let most_v = 2.0 * drive_v;
+    if volts.is_finite() { volts.clamp(-most_v, most_v) } else { volts }
 }
 
 /// Adds newtons to contacts that a board has found by a table, and none if these bytes are no table.
@@ -138,15 +145,19 @@ fn core_says(says: Says) -> CoreSays {
     }
 }
 
+/// The likeliest other number of contacts, if that is worth to be named.
+fn alternative(answer: &Answer<f64, MOST_CONTACTS>) -> Option<Alternative> {
+    let (contacts, certainty) = answer.certainty?.other?;
+    Some(Alternative { contacts, certainty }).filter(|other| other.certainty >= policy::named_share())
+}
+
 fn solution(answer: &Answer<f64, MOST_CONTACTS>) -> Solution {
     let flags = answer.flags;
-    let other = answer.certainty.and_then(|certainty| certainty.other);
-    let alternative = other.map(|(contacts, certainty)| Alternative { contacts, certainty });
     Solution {
         contacts: answer.contacts().iter().map(found).collect(),
         residual: Some(answer.residual),
         certainty: answer.certainty.map(|certainty| certainty.share),
-        alternative: alternative.filter(|other| other.certainty >= policy::named_share()),
+        alternative: alternative(answer),
         flags: Flags {
             saturated: flags.has(CoreFlags::SATURATED),
             misfit: flags.has(CoreFlags::MISFIT) || flags.has(CoreFlags::MORE),

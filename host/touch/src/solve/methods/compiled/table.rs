@@ -61,7 +61,7 @@ pub enum CompileError {
 /// # Errors
 /// [`CompileError`] if it is curved, has too many electrodes or no model.
 pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
-    Fitted::of(problem)?.table(problem, Unknown::of(problem))
+    Ok(written(problem, &Fitted::of(problem)?, Unknown::of(problem)))
 }
 
 /// What the tables of a detector are fitted with.
@@ -71,6 +71,8 @@ pub(super) struct Fitted {
     /// Between places.
     pub paired: Paired,
     between: Between,
+    /// Coefficients of all quantities of discs, a column each.
+    quantities: DMatrix<f64>,
 }
 
 impl Fitted {
@@ -88,27 +90,21 @@ impl Fitted {
             return Err(CompileError::Curved { detector: detector.name.clone() });
         }
         let (paired, between) = Paired::of(problem)?;
-        Ok(Self { splines: Splines::of(problem)?, paired, between })
-    }
-
-    /// The table for who knows [what is not known](super::changes::Changes) of the detector apart from it: of its errors it has those only that no readings tell.
-    ///
-    /// # Errors
-    /// [`CompileError`] if the model has no answer.
-    pub fn table_apart(&self, problem: &Problem) -> Result<Vec<u8>, CompileError> {
-        let directions = problem.detector().unknowns().directions;
-        let conductivity = directions.iter().flatten().filter(|(parameter, _)| *parameter == Parameter::Conductivity);
-        let square: f64 = conductivity.map(|(_, step)| step * step).sum();
-        self.table(problem, Unknown { ln_conductance: square.sqrt(), ..Unknown::default() })
-    }
-
-    fn table(&self, problem: &Problem, unknown: Unknown) -> Result<Vec<u8>, CompileError> {
+        let splines = Splines::of(problem)?;
         let of_place = |place_m: &[f64; 2]| {
             let [small, wide] = DISCS.map(|radii| of_disc(problem, *place_m, radii * problem.usual_radius_m()));
             Ok([small?, wide?].concat())
         };
-        let values = self.splines.places_m().iter().map(of_place).collect::<Result<Vec<_>, ForwardError>>()?;
-        Ok(written(problem, self, &self.splines.fitted(&values), unknown))
+        let values = splines.places_m().iter().map(of_place).collect::<Result<Vec<_>, ForwardError>>()?;
+        Ok(Self { quantities: splines.fitted(&values), splines, paired, between })
+    }
+
+    /// The table for who knows [what is not known](super::changes::Changes) of the detector apart from it: of its errors it has those only that no readings tell.
+    pub fn table_apart(&self, problem: &Problem) -> Vec<u8> {
+        let directions = problem.detector().unknowns().directions;
+        let conductivity = directions.iter().flatten().filter(|(parameter, _)| *parameter == Parameter::Conductivity);
+        let square: f64 = conductivity.map(|(_, step)| step * step).sum();
+        written(problem, self, Unknown { ln_conductance: square.sqrt(), ..Unknown::default() })
     }
 }
 
@@ -128,8 +124,8 @@ fn top_s_per_m(problem: &Problem) -> f64 {
 }
 
 /// The bytes.
-fn written(problem: &Problem, fitted: &Fitted, quantities: &DMatrix<f64>, unknown: Unknown) -> Vec<u8> {
-    let Fitted { splines: Splines { grid, .. }, paired, between } = fitted;
+fn written(problem: &Problem, fitted: &Fitted, unknown: Unknown) -> Vec<u8> {
+    let Fitted { splines: Splines { grid, .. }, paired, between, quantities } = fitted;
     let detector = problem.detector();
     let n = detector.electrodes.len();
     let pads_ohm = problem.model.electrode_fields_ohm();

@@ -6,17 +6,18 @@
 //! their readings' error.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use nalgebra::DMatrix;
 
 use super::discs::DiscFit;
 use super::search::{COLD, FIRST};
-use super::{Better, ContactFinder, ContactHypothesis};
+use super::{Better, Certainty, ContactFinder, ContactHypothesis};
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::fit::approximation::{About, ApproximationError, Linearised};
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
+use crate::solve::methods::compiled::{Compiled, FoundAlone};
 use tactomo_physics::baseline::Leakage;
 use tactomo_physics::forward::readings_v;
 use tactomo_physics::readings::Readings;
@@ -62,59 +63,88 @@ impl ContactFinder {
         if self.problem.nuisance().is_none() {
             return self.search_exact(from, target, better);
         }
-        let found = match from {
-            Some(from) => self.search_from(from, target, better),
-            None => self.search_from_nothing(target, better),
-        };
+        let found = self.search_unknown(from, target, better);
         let (ControlFlow::Break(found) | ControlFlow::Continue(found)) = found.map_break(Some);
         Some(found?.hypothesis)
     }
 
-    /// What explains a frame: first a few contacts, roughly, which a single one that fits makes the answer; else contact by contact. What
-    /// ended the search breaks.
-    fn search_from_nothing(&self, target: &Target, better: &mut Better<'_>) -> ControlFlow<Informed, Option<Informed>> {
-        let begun = self.begun_roughly(target);
-        if let Some(begun) = &begun {
-            told(begun, better)?;
-            if begun.count() == 1
-                && let Some(one) = self.caught_up(&begun.hypothesis, target)
-            {
-                let one = self.grown(one, better)?;
-                if !self.is_misfit(&one.hypothesis.fit, &one.target) {
-                    return ControlFlow::Continue(Some(one));
-                }
-            }
-        }
-        let anew = self.anew(target, better)?;
-        // What was begun with needs no more if as many are found from one contact on.
-        let other = begun.filter(|begun| anew.as_ref().is_none_or(|anew| anew.count() != begun.count()));
-        let other = other.map(|begun| self.settled(begun));
-        ControlFlow::Continue(self.more_likely(other, anew))
-    }
-
-    /// What explains a frame, from what explains it so far if that leads there, else from nothing. What ended the search breaks.
-    fn search_from(
+    /// What explains a frame: what explained the one before, or what the compiled detector finds by itself. What leaves more than noise does is gone on from, contact by
+    /// contact. What ended the search breaks.
+    fn search_unknown(
         &self,
-        from: &ContactHypothesis,
+        from: Option<&ContactHypothesis>,
         target: &Target,
         better: &mut Better<'_>,
     ) -> ControlFlow<Informed, Option<Informed>> {
-        // What was found before anything was known of the readings' errors is given with them first: to bring it to them takes a while. Else
-        // a contact that comes is shown as soon as it is found beside the others; whether it is one, and not what the detector differs by,
-        // takes longer.
-        let soon = if from.error.is_none() { self.informed_as_is(from, target) } else { self.joined(from, target) };
-        if let Some(soon) = soon {
-            told(&soon, better)?;
+        let followed = from.and_then(|from| self.caught_up(from, target));
+        let Some(alone) = self.found_by_table(target) else { return self.search_by_discs(followed, target, better) };
+        let Some(best) = self.likelier(followed, alone) else { return ControlFlow::Continue(None) };
+        told(&best, better)?;
+        if self.is_misfit(&best.hypothesis.fit, &best.target) {
+            return self.grown(best, better).map_continue(Some);
         }
-        let followed = match self.caught_up(from, target) {
+        ControlFlow::Continue(Some(best))
+    }
+
+    /// What explains a frame, where the detector has no table: from what explained the one before, if that leads there, else from nothing, contact by contact.
+    fn search_by_discs(
+        &self,
+        followed: Option<Informed>,
+        target: &Target,
+        better: &mut Better<'_>,
+    ) -> ControlFlow<Informed, Option<Informed>> {
+        let followed = match followed {
             Some(followed) => Some(self.grown(followed, better)?),
             None => None,
         };
         if followed.as_ref().is_some_and(|grown| !self.is_misfit(&grown.hypothesis.fit, &grown.target)) {
             return ControlFlow::Continue(followed);
         }
-        let anew = self.anew(target, better)?;
+        let anew = match self.alone(target) {
+            Some(one) => Some(self.grown(one, better)?),
+            None => None,
+        };
         ControlFlow::Continue(self.more_likely(followed, anew))
+    }
+
+    /// What the compiled detector finds in a frame by itself, if anything; `None` if there is no table, or not yet.
+    fn found_by_table(&self, target: &Target) -> Option<Option<Informed>> {
+        let found = {
+            let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
+            if compiled.is_none() {
+                *compiled = self.problem.compiled().map(Compiled::on);
+            }
+            compiled.as_mut()?.alone(&target.readings(), target.noise_v).ok()?
+        };
+        Some(self.informed_of(found, target))
+    }
+
+    /// What a table tells, by what the readings may be off by together near the detector that it makes likely.
+    fn informed_of(&self, found: FoundAlone, target: &Target) -> Option<Informed> {
+        let nuisance = self.problem.nuisance().filter(|_| !found.contacts.is_empty())?;
+        let steps = found.steps[..nuisance.directions()].to_vec();
+        let near = Linearised { detector: nuisance.similar(&steps).ok()?, steps };
+        let about = About { near: Some(Arc::new(near)), ..About::default() };
+        let target = self.informed(target, &found.contacts, &about)?;
+        let fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
+        let certainty = found.certainty.map(|(share, alternative)| Certainty { share, alternative });
+        Some(Informed { hypothesis: ContactHypothesis { certainty, ..ContactHypothesis::of(fit, &target) }, target })
+    }
+
+    /// The likelier of two explanations; as sure of its count as the second one is, where that has as many contacts, else as far as the other one is less likely.
+    fn likelier(&self, followed: Option<Informed>, alone: Option<Informed>) -> Option<Informed> {
+        let (Some(followed), Some(alone)) = (&followed, &alone) else { return followed.or(alone) };
+        let [old, new] = [followed, alone].map(|found| self.whole_evidence(found));
+        let mut best = if new > old { alone.clone() } else { followed.clone() };
+        best.hypothesis.certainty = match followed.count() == alone.count() {
+            true => alone.hypothesis.certainty,
+            false => {
+                let mut by_count = vec![f64::NEG_INFINITY; followed.count().max(alone.count()) + 1];
+                (by_count[followed.count()], by_count[alone.count()]) = (old, new);
+                Certainty::of(best.count(), &by_count, false)
+            }
+        };
+        Some(best)
     }
 
     /// Contacts that stand for something else, with what the readings of that may be off by together, beginning with the detector that `error`
@@ -131,40 +161,6 @@ impl ContactFinder {
         Some(self.settled(Informed { hypothesis, target }).hypothesis)
     }
 
-    /// What explains a frame so far with one contact more, if it does not fit without; linear about the detector as it was found so far.
-    fn joined(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
-        let error = from.error.as_ref()?;
-        let as_before = Target::of_mean(&target.readings(), target.frames, &self.errors, Some(error));
-        let fit = self.disc_fitter().go_on(&from.fit, &as_before, COLD)?;
-        if !self.is_misfit(&fit, &as_before) || fit.contacts.len() >= self.settings.most {
-            return None;
-        }
-        let target = self.informed(target, &fit.contacts, &error.about)?;
-        let fit = self.disc_fitter().go_on(&fit, &target, COLD)?;
-        let more = self.is_misfit(&fit, &target).then(|| self.one_more(&fit, Vec::new(), &target))?.ok()?;
-        let is_likelier = self.evidence(&more) > self.evidence(&fit);
-        let hypothesis =
-            is_likelier.then(|| ContactHypothesis { is_begun: true, ..ContactHypothesis::of(more, &target) })?;
-        Some(Informed { hypothesis, target })
-    }
-
-    /// A few contacts, found as if nothing were known of the readings' errors but their size, which is soonest. More may stand for something
-    /// else.
-    fn begun_roughly(&self, target: &Target) -> Option<Informed> {
-        let rough = Target::provisional(&target.readings(), target.frames, &self.errors);
-        let begun = self.search_exact(None, &rough, &mut |_| ControlFlow::Continue(()))?;
-        if begun.fit.contacts.len() > policy::suspicious_contacts() {
-            return None;
-        }
-        self.informed_as_is(&begun, target)
-    }
-
-    /// What explains a frame, from nothing: contact by contact.
-    fn anew(&self, target: &Target, better: &mut Better<'_>) -> ControlFlow<Informed, Option<Informed>> {
-        let Some(one) = self.alone(target) else { return ControlFlow::Continue(None) };
-        self.grown(one, better).map_continue(Some)
-    }
-
     /// The best single contact, if anything stands out.
     pub(super) fn alone(&self, target: &Target) -> Option<Informed> {
         let target = self.informed(target, &self.begun(target)?, &About::default())?;
@@ -175,13 +171,6 @@ impl ContactFinder {
         let again =
             Informed { hypothesis: ContactHypothesis::of(again, &settled.target), target: settled.target.clone() };
         self.more_likely(Some(settled), Some(again))
-    }
-
-    /// An explanation as it is, by what its readings may be off by together.
-    fn informed_as_is(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
-        let target = self.informed(target, &from.fit.contacts, &About::default())?;
-        let hypothesis = ContactHypothesis { is_begun: true, ..self.judged(from.clone(), &target)? };
-        Some(Informed { hypothesis, target })
     }
 
     fn caught_up(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
@@ -208,7 +197,7 @@ impl ContactFinder {
             let fitted = renewed.and_then(|target| {
                 let fit = self.disc_fitter().fit(contacts.clone(), &target, COLD)?;
                 let error = target.error().cloned();
-                let hypothesis = ContactHypothesis { fit, error, is_begun: false, ..hypothesis.clone() };
+                let hypothesis = ContactHypothesis { fit, error, ..hypothesis.clone() };
                 Some(Informed { hypothesis, target })
             });
             let Some(fitted) = fitted else { break };

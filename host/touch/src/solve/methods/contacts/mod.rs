@@ -34,7 +34,7 @@ mod tests;
 mod window;
 
 use std::ops::ControlFlow;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
@@ -56,6 +56,7 @@ use crate::solve::fit::linear::full_v;
 use crate::solve::fit::policy;
 use crate::solve::fit::spots::SpotModel;
 use crate::solve::fit::target::{Errors, PAD_ERROR, Target, model_error};
+use crate::solve::methods::compiled::Compiled;
 use crate::solve::problem::Problem;
 use tactomo_physics::baseline::Leakage;
 use tactomo_physics::forward::spots::SpotFields;
@@ -111,6 +112,8 @@ pub fn contact_over_needed(readings: &Readings, model: &dyn ForwardModel) -> f64
 /// What finds contacts: the same for all frames, and shared by the threads that follow and search.
 pub(crate) struct ContactFinder {
     problem: Problem,
+    /// What finds contacts in a frame by itself, on a detector that is not known exactly; made when that is asked for first.
+    compiled: Mutex<Option<Compiled>>,
     /// To look where contacts may be.
     rough: Arc<dyn ForwardModel>,
     settings: ContactSettings,
@@ -139,8 +142,6 @@ pub(crate) struct ContactHypothesis {
     error: Option<Arc<ApproximationError>>,
     /// Key frames of what is followed, for a search that is to look at these alone.
     keys: Option<Arc<[KeyFrame]>>,
-    /// Whether it is to be shown soon, before it and that error were brought to agree: as it is, it may fit worse than it would.
-    is_begun: bool,
 }
 
 /// How sure a count of contacts is, among the counts that were tried.
@@ -189,11 +190,6 @@ impl ContactHypothesis {
         self.fit.contacts.len()
     }
 
-    /// Whether it and what the readings may be off by together were not brought to agree yet: that it does not fit tells nothing then.
-    pub fn is_begun(&self) -> bool {
-        self.is_begun
-    }
-
     /// Whether a search looks at key frames alone, and leaves it as it is if these say nothing new.
     pub fn is_of_key_frames(&self) -> bool {
         self.keys.is_some()
@@ -201,7 +197,7 @@ impl ContactHypothesis {
 
     /// A fit whose count was not compared with others.
     fn of(fit: DiscFit, target: &Target) -> Self {
-        Self { fit, certainty: None, error: target.error().cloned(), keys: None, is_begun: false }
+        Self { fit, certainty: None, error: target.error().cloned(), keys: None }
     }
 
     /// A fit, with the logarithms of the evidence for each count.
@@ -249,6 +245,7 @@ impl ContactFinder {
             watching: OnceLock::new(),
             rough: problem.model.rough().unwrap_or_else(|| Arc::clone(&problem.model)),
             problem: problem.clone(),
+            compiled: Mutex::default(),
             settings,
         })
     }
