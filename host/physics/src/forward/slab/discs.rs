@@ -132,7 +132,8 @@ impl Slab {
     pub(super) fn fields_of_disc(&self, [x_m, y_m]: Point, radius_m: f64) -> Result<DiscFields, ForwardError> {
         let contact = Contact::flat(x_m, y_m, radius_m, 1.0);
         self.check_contact(&contact).map_err(|what| ForwardError::Contact { index: 0, what })?;
-        let disc = self.disc(&contact, DiscBasis::of_degree(self.contact_degree(radius_m)));
+        let degree = self.contact_degree(radius_m).min(self.resolution.even_degree);
+        let disc = self.disc(&contact, DiscBasis::of_degree(degree));
         let even = disc.uneven.as_ref().map_or(1.0, |uneven| uneven.inverse_root.powi(2));
         let own_ohm = even * self.top.even_disc_ohm(disc.own_radius_m) + self.between(&disc, &disc)[(0, 0)];
         let electrodes_ohm = disc.electrodes_ohm.row(0).iter().copied().collect();

@@ -62,6 +62,8 @@ pub struct Resolution {
     /// On the widest contacts. With 8, readings of three firm discs of 18 mm that overlap on `square-60` are within 0.0004 of the largest of those with
     /// 12, and take a third of the time.
     pub most_degree: usize,
+    /// On discs with an even current, at most.
+    pub even_degree: usize,
     /// On dots of glue.
     pub dot_degree: usize,
     /// Half waves along a side of the modes that unevenness couples.
@@ -82,6 +84,7 @@ impl Resolution {
         pad_degree: 2,
         contact_degree: 2,
         most_degree: 8,
+        even_degree: 8,
         dot_degree: 3,
         uneven_modes: 10,
         across: 11,
@@ -95,6 +98,7 @@ impl Resolution {
         pad_degree: 1,
         contact_degree: 2,
         most_degree: 8,
+        even_degree: 1,
         dot_degree: 2,
         uneven_modes: 8,
         across: 6,
@@ -107,6 +111,7 @@ impl Resolution {
         pad_degree: 3,
         contact_degree: 4,
         most_degree: MAX_DEGREE,
+        even_degree: MAX_DEGREE,
         dot_degree: 4,
         uneven_modes: 16,
         across: 11,

@@ -86,7 +86,8 @@ impl ContactFinder {
         ControlFlow::Continue(Some(best))
     }
 
-    /// What explains a frame, where the detector has no table: from what explained the one before, if that leads there, else from nothing, contact by contact.
+    /// What explains a frame, where the detector has no table: from what explained the one before, if that leads there, else from nothing, contact by contact. A few
+    /// that are found roughly are given first.
     fn search_by_discs(
         &self,
         followed: Option<Informed>,
@@ -95,7 +96,10 @@ impl ContactFinder {
     ) -> ControlFlow<Informed, Option<Informed>> {
         let followed = match followed {
             Some(followed) => Some(self.grown(followed, better)?),
-            None => None,
+            None => {
+                self.begun_roughly(target).map_or(ControlFlow::Continue(()), |begun| told(&begun, better))?;
+                None
+            }
         };
         if followed.as_ref().is_some_and(|grown| !self.is_misfit(&grown.hypothesis.fit, &grown.target)) {
             return ControlFlow::Continue(followed);
@@ -159,6 +163,18 @@ impl ContactFinder {
         let target = self.informed(&self.target_to_search(mean).ok()?, &contacts, &about)?;
         let hypothesis = ContactHypothesis::of(self.disc_fitter().fit(contacts, &target, FIRST)?, &target);
         Some(self.settled(Informed { hypothesis, target }).hypothesis)
+    }
+
+    /// A few contacts, found as if nothing were known of the readings' errors but their size, which is soonest. More may stand for something
+    /// else.
+    fn begun_roughly(&self, target: &Target) -> Option<Informed> {
+        let rough = Target::provisional(&target.readings(), target.frames, &self.errors);
+        let begun = self.search_exact(None, &rough, &mut |_| ControlFlow::Continue(()))?;
+        if begun.fit.contacts.len() > policy::suspicious_contacts() {
+            return None;
+        }
+        let target = self.informed(target, &begun.fit.contacts, &About::default())?;
+        Some(Informed { hypothesis: self.judged(begun, &target)?, target })
     }
 
     /// The best single contact, if anything stands out.
