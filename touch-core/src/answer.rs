@@ -102,7 +102,8 @@ impl<T: Real> Certainty<T> {
     pub(crate) fn of(count: usize, score: T, by_count: &[Option<T>], is_known: bool) -> Self {
         let nat = |other: usize| if is_known || other < count { T::ONE } else { T::of(MORE_NAT) };
         let odds = |other: usize, of: T| (T::of(0.5) * nat(other) * (score - of)).exp();
-        let tried = by_count.iter().enumerate().map(|(index, of)| (index + 1, of.map_or(T::ZERO, |of| odds(index + 1, of))));
+        let tried =
+            by_count.iter().enumerate().map(|(index, of)| (index + 1, of.map_or(T::ZERO, |of| odds(index + 1, of))));
         let others = || tried.clone().filter(|(other, odds)| *other != count && *odds > T::ZERO);
         let untried = if by_count.get(count).is_some_and(Option::is_none) { T::of(UNTRIED) } else { T::ZERO };
         let share = T::ONE / (T::ONE + untried + others().map(|(_, odds)| odds).sum::<T>());

@@ -56,11 +56,7 @@ impl Changes {
     ///
     /// # Errors
     /// [`ForwardError`] if a detector that is a little different cannot be modelled.
-    pub fn of(
-        problem: &Problem,
-        Fitted { splines, paired, .. }: &Fitted,
-        cores: usize,
-    ) -> Result<Self, ForwardError> {
+    pub fn of(problem: &Problem, Fitted { splines, paired, .. }: &Fitted, cores: usize) -> Result<Self, ForwardError> {
         let detector = problem.detector();
         let own_pads_ohm = pads_ohm(&*problem.model)?.into_iter().map(|ohm| ohm as f32).collect();
         let mut all = Self { own_pads_ohm, ..Self::default() };

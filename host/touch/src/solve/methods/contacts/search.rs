@@ -72,9 +72,9 @@ impl ContactFinder {
         [grown, anew].into_iter().flatten().max_by(|a, b| self.evidence(&a.fit).total_cmp(&self.evidence(&b.fit)))
     }
 
-    /// Starts of two contacts at once, where one leaves a little more than it should.
+    /// Starts of two contacts at once, where one leaves a little more than it should, or is wide: then another one far from it may be hidden in how wide it is.
     pub(super) fn pairs(&self, one: &DiscFit, target: &Target) -> Vec<Vec<Contact>> {
-        if one.contacts.len() > 1 || !self.is_doubtful(one, target) {
+        if one.contacts.len() > 1 || !self.is_doubtful(one, target) && self.may_be_two(one).is_none() {
             return Vec::new();
         }
         let looks = self.looks(target);
@@ -215,7 +215,8 @@ impl ContactFinder {
     ) -> Result<DiscFit, f64> {
         let looks = self.looks_beside(fit, target);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
-        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::parameter_price())
+        let is_worth_a_try = !starts.is_empty()
+            || ones.first().is_some_and(|best| best.gain > policy::parameter_price())
             || self.may_hide_more(fit.contacts.len());
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
             return Err(f64::NEG_INFINITY);

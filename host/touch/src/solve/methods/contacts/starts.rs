@@ -22,12 +22,16 @@ const PERFECT: f64 = 0.2;
 const ALIKE: f64 = 0.3;
 
 impl ContactFinder {
+    /// The widest contact, if it is so wide that it may be two.
+    pub(super) fn may_be_two(&self, fit: &DiscFit) -> Option<usize> {
+        let radius_m = |k: usize| fit.contacts[k].radius_m;
+        let widest = (0..fit.contacts.len()).max_by(|a, b| radius_m(*a).total_cmp(&radius_m(*b)));
+        widest.filter(|k| radius_m(*k) > policy::two_radii() * self.settings.radius_m)
+    }
+
     /// Starts with a wide contact taken for two beside each other, in some directions.
     pub(super) fn splits(&self, fit: &DiscFit) -> Vec<Vec<Contact>> {
-        let widest =
-            (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
-        let is_wide = |k: &usize| fit.contacts[*k].radius_m > policy::two_radii() * self.settings.radius_m;
-        let Some(k) = widest.filter(is_wide) else { return Vec::new() };
+        let Some(k) = self.may_be_two(fit) else { return Vec::new() };
         let wide = fit.contacts[k];
         let (along, _) = fit.along(k);
         let split = |[a, b]: [f64; 2]| {
