@@ -132,11 +132,14 @@ impl ContactFinder {
         let mut best = self.noted(first.clone(), &mut by_count);
         let _ = better(&ContactHypothesis::new(first.clone(), &by_count, target));
         best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
-        if let Some(crowd) = self.crowd(&best.0, target) {
-            let crowd = self.noted(crowd, &mut by_count);
-            if crowd.1 > best.1 {
-                last = crowd.0.clone();
-                best = crowd;
+        let pair = starts.first().filter(|_| self.may_be_two(&best.0).is_some());
+        // Spots tell little of one that is wide: the best pair is fitted as it is.
+        let pair = pair.and_then(|pair| self.plausible_fitter().fit(pair.clone(), target, COLD));
+        for several in [self.crowd(&best.0, target), pair].into_iter().flatten() {
+            let several = self.noted(several, &mut by_count);
+            if several.1 > best.1 {
+                last = several.0.clone();
+                best = several;
                 let _ = better(&ContactHypothesis::new(best.0.clone(), &by_count, target));
             }
         }
@@ -215,8 +218,7 @@ impl ContactFinder {
     ) -> Result<DiscFit, f64> {
         let looks = self.looks_beside(fit, target);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
-        let is_worth_a_try = !starts.is_empty()
-            || ones.first().is_some_and(|best| best.gain > policy::parameter_price())
+        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::parameter_price())
             || self.may_hide_more(fit.contacts.len());
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
             return Err(f64::NEG_INFINITY);
