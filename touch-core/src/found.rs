@@ -85,6 +85,22 @@ fn errors_are_those_of_many_draws() {
     assert!(squares[..2].iter().all(|square| (0.15..2.0).contains(square)) && squares[2] < 2.0, "{squares:?}");
 }
 
+/// The mean of some frames tells more than one does, and as much more as its noise is less, down to the table's own error.
+#[test]
+fn a_frame_of_less_noise_tells_more() {
+    let bytes = table();
+    let table = Table::read(&bytes).unwrap();
+    let exact = volts(&table, &[spot(0.004, -0.011, 0.3)]);
+    let noise_v = table.head().noise_v;
+    let sigma_m = |frame: Frame<'_>| Solver::new().solve(&table, &frame).unwrap().contacts()[0].sigma_m[0];
+    let [one, same, quarter] = [None, Some(noise_v), Some(noise_v / 4.0)].map(|noise_v| match noise_v {
+        Some(noise_v) => sigma_m(Frame::of_volts(&exact).with_noise(noise_v)),
+        None => sigma_m(Frame::of_volts(&exact)),
+    });
+    assert_eq!(one, same);
+    assert!((0.2..0.8).contains(&(quarter / one)), "{quarter} {one}");
+}
+
 /// One that a step would take over the edge stays there, and the other takes the step that is best with that.
 #[test]
 fn a_contact_at_a_wall_does_not_lead_others_astray() {

@@ -169,14 +169,17 @@ fn a_contact_alone_that_went_astray_is_looked_for_anew() {
 /// Shares of numbers of contacts are as their evidence.
 #[test]
 fn how_sure_a_number_is_goes_with_the_evidence() {
-    let sure = crate::Certainty::of(3, 100.0, &[None, None, Some(100.0)]);
+    let sure = crate::Certainty::of(3, 100.0, &[None, None, Some(100.0)], true);
     assert_eq!((sure.share, sure.other), (1.0, None));
-    let untried = crate::Certainty::of(2, 100.0, &[None, Some(100.0), None]);
+    let untried = crate::Certainty::of(2, 100.0, &[None, Some(100.0), None], true);
     assert!(untried.share > 0.96 && untried.share < 0.98 && untried.other.is_none(), "{untried:?}");
-    let ln_3 = 3f32.ln();
-    let unsure = crate::Certainty::of(2, 100.0, &[Some(300.0), Some(100.0), Some(100.0 + 2.0 * ln_3)]);
-    let (other, share) = unsure.other.unwrap();
-    assert!((unsure.share - 0.75).abs() < 1e-5 && other == 3 && (share - 0.25).abs() < 1e-5, "{unsure:?}");
+    // Where what the detector may differ by is fitted, a third of the evidence over more contacts counts.
+    for (is_known, nats) in [(true, 3f32.ln()), (false, 3.0 * 3f32.ln())] {
+        let tried = [Some(300.0), Some(100.0), Some(100.0 + 2.0 * nats)];
+        let unsure = crate::Certainty::of(2, 100.0, &tried, is_known);
+        let (other, share) = unsure.other.unwrap();
+        assert!((unsure.share - 0.75).abs() < 1e-5 && other == 3 && (share - 0.25).abs() < 1e-5, "{unsure:?}");
+    }
     // A search tells it of what it has tried.
     let costs = [0.0, 5000.0, 230.0, 210.0];
     let by_count = |scene: &Scene, radius_deviation| {
@@ -186,7 +189,7 @@ fn how_sure_a_number_is_goes_with_the_evidence() {
     let mut search = Search::NONE;
     let wants = search.begin(None, None, 240.0);
     let (_, found) = run(&mut search, wants, by_count, |scene| if scene.count < 2 { 4000.0 } else { 20.0 });
-    let told = search.certainty(&found.unwrap());
+    let told = search.certainty(&found.unwrap(), true);
     // Three leave 20 less and cost 21 more.
     let odds = (-0.5f32).exp();
     assert!((told.share - 1.0 / (1.0 + odds)).abs() < 1e-3 && told.other.unwrap().0 == 3, "{told:?}");

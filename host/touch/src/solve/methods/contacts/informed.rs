@@ -123,15 +123,30 @@ impl ContactFinder {
         Some(self.informed_of(found, target))
     }
 
-    /// What a table tells, by what the readings may be off by together near the detector that it makes likely.
+    /// What a table tells, by what the readings may be off by together near the detector that it makes likely, without contacts that stand for what the table is off by:
+    /// the model itself does as well without them.
     fn informed_of(&self, found: FoundAlone, target: &Target) -> Option<Informed> {
         let nuisance = self.problem.nuisance().filter(|_| !found.contacts.is_empty())?;
         let steps = found.steps[..nuisance.directions()].to_vec();
         let near = Linearised { detector: nuisance.similar(&steps).ok()?, steps };
         let about = About { near: Some(Arc::new(near)), ..About::default() };
         let target = self.informed(target, &found.contacts, &about)?;
-        let fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
-        let certainty = found.certainty.map(|(share, alternative)| Certainty { share, alternative });
+        let count = found.contacts.len();
+        let mut fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
+        let mut by_count = vec![f64::NEG_INFINITY; count + 1];
+        by_count[count] = self.evidence(&fit);
+        while let Some(fewer) = self.one_fewer(&fit, &target) {
+            let [before, without] = [fit.contacts.len(), fewer.contacts.len()];
+            by_count[without] = self.evidence(&fewer);
+            if by_count[without] <= by_count[before] {
+                break;
+            }
+            fit = fewer;
+        }
+        let certainty = match fit.contacts.len() == count {
+            true => found.certainty.map(|(share, alternative)| Certainty { share, alternative }),
+            false => Certainty::of(fit.contacts.len(), &by_count, false),
+        };
         Some(Informed { hypothesis: ContactHypothesis { certainty, ..ContactHypothesis::of(fit, &target) }, target })
     }
 

@@ -74,7 +74,8 @@ impl ContactFinder {
 
     /// Starts of two contacts at once, where one leaves a little more than it should, or is wide: then another one far from it may be hidden in how wide it is.
     pub(super) fn pairs(&self, one: &DiscFit, target: &Target) -> Vec<Vec<Contact>> {
-        if one.contacts.len() > 1 || !self.is_doubtful(one, target) && self.may_be_two(one).is_none() {
+        let may_be_two = self.is_doubtful(one, target) || self.may_be_two(one).is_some();
+        if one.contacts.len() > 1 || self.settings.most < 2 || !may_be_two {
             return Vec::new();
         }
         let looks = self.looks(target);
@@ -132,9 +133,10 @@ impl ContactFinder {
         let mut best = self.noted(first.clone(), &mut by_count);
         let _ = better(&ContactHypothesis::new(first.clone(), &by_count, target));
         best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
-        let pair = starts.first().filter(|_| self.may_be_two(&best.0).is_some());
-        // Spots tell little of one that is wide: the best pair is fitted as it is.
-        let pair = pair.and_then(|pair| self.plausible_fitter().fit(pair.clone(), target, COLD));
+        // Spots tell little of one that is wide: pairs are fitted as they are.
+        let pairs = starts.iter().filter(|_| self.may_be_two(&best.0).is_some());
+        let pairs = pairs.filter_map(|pair| self.plausible_fitter().fit(pair.clone(), target, COLD));
+        let pair = pairs.max_by(|a, b| self.evidence(a).total_cmp(&self.evidence(b)));
         for several in [self.crowd(&best.0, target), pair].into_iter().flatten() {
             let several = self.noted(several, &mut by_count);
             if several.1 > best.1 {
@@ -284,7 +286,7 @@ impl ContactFinder {
     }
 
     /// The best fit with one contact fewer: without any of them, and with two that nearly touch taken for one.
-    fn one_fewer(&self, fit: &DiscFit, target: &Target) -> Option<DiscFit> {
+    pub(super) fn one_fewer(&self, fit: &DiscFit, target: &Target) -> Option<DiscFit> {
         let count = fit.contacts.len();
         if count < 2 {
             return None;

@@ -1,0 +1,72 @@
+//! A detector compiled, with what is not known of it.
+
+use tactomo_touch_core::{Room, Table};
+
+use super::changes::Changes;
+use super::table::{CompileError, Fitted};
+use super::{MOST_CONTACTS, MOST_DIRECTIONS};
+use crate::solve::problem::Problem;
+use tactomo_physics::causes::with_causes;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::ForwardError;
+
+/// Fields of a detector and of what is not known of it, which take long: the same whatever board measures it.
+pub(crate) struct CompiledFields {
+    fitted: Fitted,
+    changes: Changes,
+}
+
+/// A detector's table, and what it may differ by, as a board measures it.
+#[derive(Debug)]
+pub(crate) struct CompiledDetector {
+    pub(super) bytes: Vec<u8>,
+    pub(super) electrodes: usize,
+    pub(super) drive_v: f64,
+    /// None of a detector that is known exactly.
+    pub(super) changes: Option<Changes>,
+    /// Numbers and floats that work on it takes room for.
+    pub(super) room: [usize; 2],
+}
+
+impl CompiledFields {
+    /// Of a problem's detector, in so many threads.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if it is curved, or there are too many electrodes for a table.
+    pub fn of(problem: &Problem, cores: usize) -> Result<Self, ForwardError> {
+        let fitted = Fitted::of(problem).map_err(|error| forward_error(error, problem.detector()))?;
+        let changes = Changes::of(problem, &fitted, cores)?;
+        Ok(Self { fitted, changes })
+    }
+
+    /// The detector as a problem measures it.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if it may differ in too many directions.
+    pub fn measured(&self, problem: &Problem) -> Result<CompiledDetector, ForwardError> {
+        let detector = problem.detector();
+        let refused = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
+        let bytes = self.fitted.table_apart(problem);
+        let table = Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
+        let changes = self.changes.measured(detector);
+        let mut room = [0; 2];
+        if let Some(changes) = &changes {
+            let unknown = changes.unknown();
+            let count = unknown.directions.len();
+            if count > MOST_DIRECTIONS {
+                let what = format!("it may differ in {count} directions; `core` takes {MOST_DIRECTIONS} at most");
+                return Err(refused(what));
+            }
+            let [numbers, floats] = [Room::<f64>::numbers, Room::<f64>::floats];
+            room = [numbers(&table, &unknown, MOST_CONTACTS), floats(&table, &unknown, MOST_CONTACTS)];
+        }
+        Ok(CompiledDetector { electrodes: detector.electrodes.len(), drive_v: detector.drive_v, bytes, changes, room })
+    }
+}
+
+fn forward_error(error: CompileError, detector: &Detector) -> ForwardError {
+    match error {
+        CompileError::Model(error) => error,
+        error => ForwardError::Detector { detector: detector.name.clone(), what: with_causes(&error) },
+    }
+}
