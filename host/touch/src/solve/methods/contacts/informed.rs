@@ -123,19 +123,26 @@ impl ContactFinder {
         Some(self.informed_of(found, target))
     }
 
-    /// What a table tells, by what the readings may be off by together near the detector that it makes likely, without contacts that stand for what the table is off by:
-    /// the model itself does as well without them.
+    /// What a table tells, by what the readings may be off by together near the detector that it makes likely.
     fn informed_of(&self, found: FoundAlone, target: &Target) -> Option<Informed> {
         let nuisance = self.problem.nuisance().filter(|_| !found.contacts.is_empty())?;
         let steps = found.steps[..nuisance.directions()].to_vec();
         let near = Linearised { detector: nuisance.similar(&steps).ok()?, steps };
         let about = About { near: Some(Arc::new(near)), ..About::default() };
         let target = self.informed(target, &found.contacts, &about)?;
-        let count = found.contacts.len();
-        let mut fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
+        let fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
+        let (fit, of_fewer) = self.without_needless(fit, &target);
+        let of_table = found.certainty.map(|(share, alternative)| Certainty { share, alternative });
+        let certainty = of_fewer.or(of_table);
+        Some(Informed { hypothesis: ContactHypothesis { certainty, ..ContactHypothesis::of(fit, &target) }, target })
+    }
+
+    /// A fit without contacts that stand for what a table is off by: by the model itself it is likelier without them. How sure that is, if there are any.
+    fn without_needless(&self, mut fit: DiscFit, target: &Target) -> (DiscFit, Option<Certainty>) {
+        let count = fit.contacts.len();
         let mut by_count = vec![f64::NEG_INFINITY; count + 1];
         by_count[count] = self.evidence(&fit);
-        while let Some(fewer) = self.one_fewer(&fit, &target) {
+        while let Some(fewer) = self.one_fewer(&fit, target) {
             let [before, without] = [fit.contacts.len(), fewer.contacts.len()];
             by_count[without] = self.evidence(&fewer);
             if by_count[without] <= by_count[before] {
@@ -143,11 +150,9 @@ impl ContactFinder {
             }
             fit = fewer;
         }
-        let certainty = match fit.contacts.len() == count {
-            true => found.certainty.map(|(share, alternative)| Certainty { share, alternative }),
-            false => Certainty::of(fit.contacts.len(), &by_count, false),
-        };
-        Some(Informed { hypothesis: ContactHypothesis { certainty, ..ContactHypothesis::of(fit, &target) }, target })
+        let left = fit.contacts.len();
+        let certainty = (left < count).then(|| Certainty::of(left, &by_count, false)).flatten();
+        (fit, certainty)
     }
 
     /// The likelier of two explanations; as sure of its count as the second one is, where that has as many contacts, else as far as the other one is less likely.
