@@ -133,8 +133,9 @@ impl ContactFinder {
         let mut best = self.noted(first.clone(), &mut by_count);
         let _ = better(&ContactHypothesis::new(first.clone(), &by_count, target));
         best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
-        // Spots tell little of one that is wide: pairs are fitted as they are.
-        let pairs = starts.iter().filter(|_| self.may_be_two(&best.0).is_some());
+        // One that is wide and explains all would be the end of it. Spots tell little of it: pairs are fitted as they are.
+        let would_end = self.may_be_two(&best.0).is_some() && !self.is_doubtful(&best.0, target);
+        let pairs = starts.iter().filter(|_| would_end);
         let pairs = pairs.filter_map(|pair| self.plausible_fitter().fit(pair.clone(), target, COLD));
         let pair = pairs.max_by(|a, b| self.evidence(a).total_cmp(&self.evidence(b)));
         for several in [self.crowd(&best.0, target), pair].into_iter().flatten() {
