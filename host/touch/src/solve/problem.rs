@@ -178,7 +178,7 @@ impl Problem {
     }
 
     /// The detector as measured, compiled with what is not known of it; `None` if it is exact or curved, has too many electrodes or is seen through some of them, and
-    /// as long as that is [made beside](Self::make_nuisance_beside). Else the first call compiles it, which takes about a second with 16 electrodes.
+    /// as long as that is [made beside](Self::make_nuisance_beside). Else the first call compiles it, which takes half a second of a core with 16 electrodes.
     pub(crate) fn compiled(&self) -> Option<CompiledDetector> {
         let made = || self.nuisance.fields.get().and_then(Option::as_ref);
         let fields = if self.is_made_beside() { made() } else { self.made_fields(threads::cores()) };

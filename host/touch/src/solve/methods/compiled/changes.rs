@@ -24,7 +24,8 @@ pub(super) struct Changes {
     directions: Vec<Direction>,
     changes: Vec<Change>,
     tables: usize,
-    fields_ohm: Vec<f32>,
+    /// Some megabytes, which all that measure the detector share.
+    fields_ohm: Arc<Vec<f32>>,
     pads_ohm: Vec<f32>,
     distances_ohm: Vec<f32>,
     walls: Vec<f32>,
@@ -149,10 +150,11 @@ impl Changes {
         }
         self.tables = used.len();
         let of = |table: &usize| &tables[*table];
+        let fields_ohm = Arc::make_mut(&mut self.fields_ohm);
         for node in 0..sides[0] * sides[1] {
             for table in used.iter().map(of) {
                 let value = |q: usize| table.fields_ohm.as_ref().map_or(0.0, |fields| fields[(node, q)]);
-                self.fields_ohm.extend((0..=electrodes).map(|q| value(q) as f32));
+                fields_ohm.extend((0..=electrodes).map(|q| value(q) as f32));
             }
         }
         for table in used.iter().map(of) {
