@@ -79,6 +79,7 @@ impl ContactFinder {
         let followed = from.and_then(|from| self.caught_up(from, target));
         let Some(alone) = self.found_by_table(target) else { return self.search_by_discs(followed, target, better) };
         let Some(best) = self.likelier(followed, alone) else { return ControlFlow::Continue(None) };
+        let best = self.without_needless(best);
         told(&best, better)?;
         if self.is_misfit(&best.hypothesis.fit, &best.target) {
             return self.grown(best, better).map_continue(Some);
@@ -131,28 +132,26 @@ impl ContactFinder {
         let about = About { near: Some(Arc::new(near)), ..About::default() };
         let target = self.informed(target, &found.contacts, &about)?;
         let fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
-        let (fit, of_fewer) = self.without_needless(fit, &target);
-        let of_table = found.certainty.map(|(share, alternative)| Certainty { share, alternative });
-        let certainty = of_fewer.or(of_table);
-        Some(Informed { hypothesis: ContactHypothesis { certainty, ..ContactHypothesis::of(fit, &target) }, target })
+        let certainty = found.certainty.map(|(share, alternative)| Certainty { share, alternative });
+        let hypothesis = ContactHypothesis { certainty, ..ContactHypothesis::of(fit, &target) };
+        Some(self.settled(Informed { hypothesis, target }))
     }
 
-    /// A fit without contacts that stand for what a table is off by: by the model itself it is likelier without them. How sure that is, if there are any.
-    fn without_needless(&self, mut fit: DiscFit, target: &Target) -> (DiscFit, Option<Certainty>) {
-        let count = fit.contacts.len();
+    /// An explanation without contacts that stand for what a table is off by: by the model itself it is likelier without them.
+    fn without_needless(&self, mut found: Informed) -> Informed {
+        let count = found.count();
         let mut by_count = vec![f64::NEG_INFINITY; count + 1];
-        by_count[count] = self.evidence(&fit);
-        while let Some(fewer) = self.one_fewer(&fit, target) {
-            let [before, without] = [fit.contacts.len(), fewer.contacts.len()];
+        by_count[count] = self.evidence(&found.hypothesis.fit);
+        while let Some(fewer) = self.one_fewer(&found.hypothesis.fit, &found.target) {
+            let [before, without] = [found.count(), fewer.contacts.len()];
             by_count[without] = self.evidence(&fewer);
             if by_count[without] <= by_count[before] {
                 break;
             }
-            fit = fewer;
+            let certainty = Certainty::of(without, &by_count, false);
+            found.hypothesis = ContactHypothesis { certainty, ..ContactHypothesis::of(fewer, &found.target) };
         }
-        let left = fit.contacts.len();
-        let certainty = (left < count).then(|| Certainty::of(left, &by_count, false)).flatten();
-        (fit, certainty)
+        found
     }
 
     /// The likelier of two explanations; as sure of its count as the second one is, where that has as many contacts, else as far as the other one is less likely.
