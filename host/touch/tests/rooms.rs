@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each room with those that it may use, all of which stand above it: so there are no cycles.
-const PLAN: [(&str, &[&str]); 27] = [
+const PLAN: [(&str, &[&str]); 28] = [
     ("gaussian", &[]),
     ("scanning", &[]),
     ("student", &[]),
@@ -19,11 +19,16 @@ const PLAN: [(&str, &[&str]); 27] = [
     ("solve::fit", &["solve::answer"]),
     ("learned", &["solve::answer", "solve::fit"]),
     ("solve::before", &["solve::fit"]),
-    ("solve::problem", &["learned", "solve::before"]),
+    ("solve::compiled", &["solve::fit"]),
+    ("solve::problem", &["learned", "solve::before", "solve::compiled"]),
     ("solve::solver", &["solve::answer"]),
     ("solve::after", &["gaussian", "solve::answer", "solve::fit", "solve::problem"]),
     ("solve::health", &["solve::answer"]),
-    // Contacts average frames and number contacts by themselves.
+    (
+        "solve::methods::compiled",
+        &["solve::answer", "solve::compiled", "solve::fit", "solve::problem", "solve::solver"],
+    ),
+    // Contacts begin with those that a table tells; they average frames and number contacts by themselves.
     (
         "solve::methods::contacts",
         &[
@@ -34,9 +39,9 @@ const PLAN: [(&str, &[&str]); 27] = [
             "solve::problem",
             "solve::solver",
             "solve::after",
+            "solve::methods::compiled",
         ],
     ),
-    ("solve::methods::compiled", &["solve::answer", "solve::fit", "solve::problem", "solve::solver"]),
     ("solve::methods::shapes", &["solve::answer", "solve::fit", "solve::problem"]),
     ("solve::methods::image", &["solve::answer", "solve::fit", "solve::problem", "solve::solver"]),
     ("solve::methods::linear", &["solve::answer", "solve::fit", "solve::solver"]),

@@ -4,21 +4,24 @@
 //! answer    what a solver says: Solution, FoundContact, Flags, errors          -> nobody
 //! fit       least squares, evidence, policy, the linear theory                 -> answer
 //! before    complete, adaptive_mean, latest: readings to readings                      -> fit
-//! problem   what solvers are made for: a detector with its models              -> before, what was learned
+//! compiled  a detector compiled for `touch-core`: a table, what it may differ by  -> fit
+//! problem   what solvers are made for: a detector with its models              -> before, compiled, what was learned
 //! solver    what a method is to those who run it: one trait, and two halves    -> answer
 //! after     associate, force, correct: solutions to solutions                  -> answer, fit, problem
 //! health    which electrodes cannot be right                                   -> answer
-//! methods   contacts | shapes | image | linear | network | kernel | comparisons
-//!           -> answer, fit, problem, solver; contacts also -> before, after: they average frames and number contacts by themselves
+//! methods   compiled | shapes | image | linear | network | kernel | comparisons
+//!           -> answer, fit, problem, solver
+//!           contacts, which average frames, number contacts by themselves and begin with those of compiled  -> these too, before, after
 //!           auto, which chooses among contacts, shapes and image               -> these too
 //! pipeline  before -> method -> after: the page to read first                  -> all of these
 //! ```
 //!
-//! Methods know none of each other, but for `auto`. `tests/rooms.rs` is this plan as code, and holds every arrow.
+//! Methods know none of each other, but for `contacts` and `auto`. `tests/rooms.rs` is this plan as code, and holds every arrow.
 
 mod after;
 pub(crate) mod answer;
 mod before;
+mod compiled;
 pub(crate) mod fit;
 mod health;
 mod methods;
@@ -37,6 +40,7 @@ pub use self::answer::{
 pub use self::before::adaptive_mean::AdaptiveMean;
 pub(crate) use self::before::adaptive_mean::rounding_v;
 pub use self::before::latest::Latest;
+pub use self::compiled::{CompileError, CompiledTable, TableFileError};
 #[cfg(feature = "ablation")]
 pub use self::fit::ablation::Threshold;
 pub use self::fit::interpolate::Interpolation;
@@ -49,7 +53,7 @@ pub use self::health::table::{TableDoubt, table_doubt};
 pub use self::health::watch::{ElectrodeWatch, FaultyElectrodes, Look};
 pub use self::methods::auto::Auto;
 pub use self::methods::comparisons::{Bsbl, Nonnegative, Tv};
-pub use self::methods::compiled::{CompileError, Compiled, CompiledTable, TableFileError, add_newtons, compile};
+pub use self::methods::compiled::{Compiled, add_newtons, compile};
 pub use self::methods::contacts::{ContactSettings, Contacts, contact_over_needed};
 pub use self::methods::image::{Nonlinear, NonlinearSettings};
 pub use self::methods::kernel::KernelSolver;

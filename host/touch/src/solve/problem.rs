@@ -1,7 +1,6 @@
 //! What solvers are made for.
 
 use std::borrow::Cow;
-use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread;
@@ -15,7 +14,7 @@ use tactomo_physics::threads;
 
 use crate::learned::Learned;
 use crate::solve::before::complete::Completer;
-use crate::solve::methods::compiled::{CompiledDetector, CompiledFields};
+use crate::solve::compiled::{CompiledDetector, CompiledFields, Modelled};
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 ///
@@ -182,12 +181,12 @@ impl Problem {
     pub(crate) fn compiled(&self) -> Option<CompiledDetector> {
         let made = || self.nuisance.fields.get().and_then(Option::as_ref);
         let fields = if self.is_made_beside() { made() } else { self.made_fields(threads::cores()) };
-        fields?.measured(self).ok()
+        fields?.measured(self.modelled()).ok()
     }
 
     fn made_fields(&self, cores: usize) -> Option<&CompiledFields> {
         let is_whole = self.nuisance.seen_of.is_none() && self.made_already().is_some();
-        let made = || is_whole.then(|| CompiledFields::of(self, cores).ok()).flatten();
+        let made = || is_whole.then(|| CompiledFields::of(self.modelled(), cores).ok()).flatten();
         self.nuisance.fields.get_or_init(made).as_ref()
     }
 
@@ -211,12 +210,9 @@ impl Problem {
         self.spacing_m() / 6.0
     }
 
-    /// Resistance of the current that crowds under a disc of the usual radius on a bare layer (ohm): on a half space, and of a sheet from there to `e` times
-    /// as far.
-    pub(crate) fn constriction_ohm(&self) -> Option<f64> {
-        let (detector, radius_m) = (self.detector(), self.usual_radius_m());
-        let top_s_per_m = detector.layers.last()?.top_s_per_m;
-        Some(1.0 / (4.0 * top_s_per_m * radius_m) + 1.0 / (TAU * detector.sheet_conductance_s()))
+    /// The detector as measured, with what is compiled of it.
+    pub(crate) fn modelled(&self) -> Modelled<'_> {
+        Modelled { model: &self.model, detector: self.detector(), radius_m: self.usual_radius_m() }
     }
 
     /// The problem through some of its electrodes, in this order, with some of all its electrodes joined. Joined electrodes are one:

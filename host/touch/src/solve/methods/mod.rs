@@ -1,4 +1,4 @@
-//! The methods, a folder each. They know none of each other, but for [`auto`], which chooses among `contacts`, `shapes` and `image`.
+//! The methods, a folder each. They know none of each other, but for [`contacts`], which begins with those of [`compiled`], and [`auto`], which chooses among `contacts`, `shapes` and `image`.
 
 pub(crate) mod auto;
 pub(crate) mod comparisons;

@@ -71,7 +71,7 @@ impl Meter {
         Some(Self {
             spot_model: SpotModel::new(detector, problem.model.electrode_fields_ohm()),
             fields: problem.model.spots(radius_m)?,
-            constriction_ohm: problem.constriction_ohm()?,
+            constriction_ohm: problem.modelled().constriction_ohm()?,
             sheet_s,
             noise_v: detector.adc.deviation_v(),
             full_v: full_v(detector),

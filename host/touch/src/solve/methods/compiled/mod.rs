@@ -2,24 +2,17 @@
 //!
 //! On a computer it works in `f64`, and finds up to [`MOST_CONTACTS`].
 
-mod between;
-mod changes;
-mod detector;
-mod file;
-mod splines;
-mod table;
 #[cfg(test)]
 mod tests;
-mod unknown;
 
 use tactomo_touch_core::{
     Answer, Contact, Flags as CoreFlags, Frame, FrameError, Room, Says as CoreSays, Solver as Core, Table,
 };
 
-pub(crate) use self::detector::{CompiledDetector, CompiledFields};
-pub use self::file::{CompiledTable, TableFileError};
-pub use self::table::{CompileError, compile};
 use crate::solve::answer::{Alternative, Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
+use crate::solve::compiled::{
+    CompileError, CompiledDetector, CompiledFields, MOST_CONTACTS, MOST_DIRECTIONS, compiled,
+};
 use crate::solve::fit::policy;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
@@ -28,11 +21,6 @@ use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::scene::Contact as Disc;
 use tactomo_physics::threads;
-
-/// Most contacts that it looks for.
-const MOST_CONTACTS: usize = 8;
-/// Most directions in which a detector may differ.
-const MOST_DIRECTIONS: usize = 256;
 
 /// `core`: contacts by the board's own search, by a table.
 pub struct Compiled {
@@ -58,7 +46,8 @@ impl Compiled {
     /// # Errors
     /// [`ForwardError`] if it is curved, or there are too many electrodes for a table.
     pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
-        Ok(Self::on(CompiledFields::of(problem, threads::cores())?.measured(problem)?))
+        let modelled = problem.modelled();
+        Ok(Self::on(CompiledFields::of(modelled, threads::cores())?.measured(modelled)?))
     }
 
     /// On a detector that was compiled.
@@ -118,6 +107,14 @@ impl Solver for Compiled {
     fn reset(&mut self) {
         self.core.reset();
     }
+}
+
+/// The table of a detector, as it is known and as its board measures it.
+///
+/// # Errors
+/// [`CompileError`] if it is curved, has too many electrodes or no model.
+pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
+    compiled(problem.modelled(), problem.nuisance())
 }
 
 /// A reading as a board can give it (V): none is far beyond its drive.

@@ -1,5 +1,5 @@
-use super::between::Ways;
 use super::*;
+use crate::solve::compiled::Ways;
 use crate::solve::pipeline::method::Method;
 use tactomo_physics::detector::{ConverterErrors, Detector, ForceLaw, Outline, Parameter, Tolerances, electrode_grid};
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
@@ -264,7 +264,11 @@ fn tables_are_read_with_the_walls_that_they_are_fitted_with() {
         let problem = Problem::of(&Detector { outline, ..detector() }).unwrap();
         let bytes = compile(&problem).unwrap();
         let walls_m = Table::read(&bytes).unwrap().walls_m::<f64>();
-        assert_eq!((walls_m.is_some(), Ways::of(&problem).walls_m.is_some()), (has_walls, has_walls), "{cut_m}");
+        assert_eq!(
+            (walls_m.is_some(), Ways::of(problem.modelled()).walls_m.is_some()),
+            (has_walls, has_walls),
+            "{cut_m}"
+        );
     }
 }
 

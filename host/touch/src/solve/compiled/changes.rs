@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Modelled;
 use super::between::{Between, Paired};
 use super::splines::Splines;
 use super::table::Fitted;
 use crate::solve::fit::target::PAD_ERROR;
-use crate::solve::problem::Problem;
 use tactomo_physics::detector::{Detector, Parameter};
 use tactomo_physics::forward::{ForwardError, ForwardModel, changed_models, pads_ohm, sheet_drops_ohm};
 use tactomo_physics::scene::Contact;
@@ -20,7 +20,7 @@ use tactomo_touch_core::{Change, Direction, Unknown};
 
 /// All that is not known of a detector.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Changes {
+pub(crate) struct Changes {
     directions: Vec<Direction>,
     changes: Vec<Change>,
     tables: usize,
@@ -53,22 +53,26 @@ struct Compiled {
 }
 
 impl Changes {
-    /// Of a problem's detector, by what its table is fitted with, but for the converters that measure it.
+    /// Of a detector, by what its table is fitted with, but for the converters that measure it.
     ///
     /// # Errors
     /// [`ForwardError`] if a detector that is a little different cannot be modelled.
-    pub fn of(problem: &Problem, Fitted { splines, paired, .. }: &Fitted, cores: usize) -> Result<Self, ForwardError> {
-        let detector = problem.detector();
-        let own_pads_ohm = pads_ohm(&*problem.model)?.into_iter().map(|ohm| ohm as f32).collect();
+    pub(super) fn of(
+        modelled: Modelled<'_>,
+        Fitted { splines, paired, .. }: &Fitted,
+        cores: usize,
+    ) -> Result<Self, ForwardError> {
+        let detector = modelled.detector;
+        let own_pads_ohm = pads_ohm(&**modelled.model)?.into_iter().map(|ohm| ohm as f32).collect();
         let mut all = Self { own_pads_ohm, ..Self::default() };
         let directions = detector.unknowns().directions;
         if directions.is_empty() {
             return Ok(all);
         }
-        let coarse = problem.model.coarse()?.unwrap_or_else(|| Arc::clone(&problem.model));
+        let coarse = modelled.model.coarse()?.unwrap_or_else(|| Arc::clone(modelled.model));
         let (compiled, sums) = sums_of(&coarse, &directions)?;
-        let base = sampled(&*coarse, splines, problem.usual_radius_m())?;
-        let table = |sum: &Sum| table_of(sum, (&coarse, &base), splines, paired, problem.usual_radius_m());
+        let base = sampled(&*coarse, splines, modelled.radius_m)?;
+        let table = |sum: &Sum| table_of(sum, (&coarse, &base), splines, paired, modelled.radius_m);
         let mut tables = threads::map_on(cores, &sums, table).into_iter().collect::<Result<Vec<_>, ForwardError>>()?;
         let sheet = directions.iter().flatten().any(|(parameter, _)| *parameter == Parameter::DrivingSheet);
         let sheet = sheet.then(|| {

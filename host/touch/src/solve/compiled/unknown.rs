@@ -5,9 +5,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Modelled;
 use crate::solve::fit::target::converter_patterns_v;
-use crate::solve::problem::Problem;
-use tactomo_physics::forward::readings_v;
+use tactomo_physics::forward::{Nuisance, readings_v};
 use tactomo_physics::scene::Contact;
 
 /// Places that stand for all of a detector, as shares of the outline's sides.
@@ -35,9 +35,9 @@ pub(super) struct Unknown {
 }
 
 impl Unknown {
-    /// Of a problem's detector.
-    pub fn of(problem: &Problem) -> Self {
-        let all: Vec<_> = tried_m(problem).filter_map(|place_m| Self::at(problem, place_m)).collect();
+    /// Of a detector, by what is not known of it.
+    pub fn of(modelled: Modelled<'_>, nuisance: Option<&Nuisance>) -> Self {
+        let all: Vec<_> = tried_m(modelled).filter_map(|place_m| Self::at(modelled, nuisance, place_m)).collect();
         let mean = |of: fn(&Self) -> f64| {
             let squares: f64 = all.iter().map(|one| of(one).powi(2)).sum();
             (squares / all.len().max(1) as f64).sqrt()
@@ -50,15 +50,15 @@ impl Unknown {
     }
 
     /// At a place; `None` where the model has no answer.
-    fn at(problem: &Problem, [x_m, y_m]: [f64; 2]) -> Option<Self> {
-        let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
+    fn at(modelled: Modelled<'_>, nuisance: Option<&Nuisance>, [x_m, y_m]: [f64; 2]) -> Option<Self> {
+        let (detector, radius_m) = (modelled.detector, modelled.radius_m);
         let contact = Contact::flat(x_m, y_m, radius_m, detector.sheet_conductance_s());
-        let read = |contact: Contact| Some(readings_v(&problem.model.impedance_ohm(&[contact]).ok()?, detector));
+        let read = |contact: Contact| Some(readings_v(&modelled.model.impedance_ohm(&[contact]).ok()?, detector));
         let readings = read(contact)?;
         let of_electrode = |e: usize| detector.electrodes[e].converter;
         let mut unknown_v = converter_patterns_v(&readings, &detector.converters, of_electrode);
         let converters = unknown_v.ncols();
-        if let Some(nuisance) = problem.nuisance() {
+        if let Some(nuisance) = nuisance {
             let of_tolerances_v = nuisance.patterns_v(&[contact], detector).ok()?;
             unknown_v = unknown_v.resize_horizontally(converters + of_tolerances_v.ncols(), 0.0);
             unknown_v.columns_mut(converters, of_tolerances_v.ncols()).copy_from(&of_tolerances_v);
@@ -92,8 +92,8 @@ impl Unknown {
 }
 
 /// Places that stand for all of a detector (m).
-pub(super) fn tried_m(problem: &Problem) -> impl Iterator<Item = [f64; 2]> {
-    let outline = &problem.detector().outline;
+pub(super) fn tried_m(modelled: Modelled<'_>) -> impl Iterator<Item = [f64; 2]> {
+    let outline = &modelled.detector.outline;
     let [low_m, high_m] = outline.bounds();
     let at = move |share: [f64; 2]| [0, 1].map(|axis| low_m[axis] + share[axis] * (high_m[axis] - low_m[axis]));
     TRIED.into_iter().map(at).filter(|place_m| outline.holds(*place_m))

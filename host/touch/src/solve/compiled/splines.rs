@@ -9,8 +9,8 @@ use tactomo_physics::detector::Outline;
 use tactomo_touch_core::spline::{interval, weights};
 use tactomo_touch_core::table::MAX_SIDE;
 
+use super::Modelled;
 use super::table::{CompileError, failed};
-use crate::solve::problem::Problem;
 
 /// Cells, about. Of 390 random scenes of one to three discs on `square-60` 27 contacts are invented with 35 cells along a side (106 kB), 35 with 34 (100 kB) and 35
 /// with 33 (95 kB); 66, 73 and 73 are missed.
@@ -32,9 +32,9 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Of a problem's detector.
-    pub fn of(problem: &Problem) -> Self {
-        let [low_m, high_m] = problem.detector().outline.bounds();
+    /// Of a detector.
+    pub fn of(modelled: Modelled<'_>) -> Self {
+        let [low_m, high_m] = modelled.detector.outline.bounds();
         let size_m = [0, 1].map(|axis| high_m[axis] - low_m[axis]);
         let step_m = (size_m[0] * size_m[1] / CELLS as f64).sqrt();
         let cells = size_m.map(|size_m| ((size_m / step_m).round() as usize).clamp(LEAST_CELLS, MAX_SIDE - 3));
@@ -78,13 +78,13 @@ pub(super) struct Splines {
 }
 
 impl Splines {
-    /// Over a problem's detector.
+    /// Over a detector.
     ///
     /// # Errors
     /// [`CompileError::Fit`] if its places do not determine them.
-    pub fn of(problem: &Problem) -> Result<Self, CompileError> {
-        let grid = Grid::of(problem);
-        let outline = &problem.detector().outline;
+    pub fn of(modelled: Modelled<'_>) -> Result<Self, CompileError> {
+        let grid = Grid::of(modelled);
+        let outline = &modelled.detector.outline;
         let [columns, rows] = grid.cells;
         let corners = (0..=rows).flat_map(|j| (0..=columns).map(move |i| [i as f64, j as f64]));
         // A corner on the outline is as far inside as rounding may take it outside.
@@ -116,7 +116,7 @@ impl Splines {
             (1..rows - 1).for_each(|j| smooth([j - 1, j, j + 1].map(|j| j * columns + i)));
         }
         let plan: Arc<Plan> = Plan::new(columns * rows, &places);
-        let factor = plan.factorise(&elements).map_err(|_| failed(problem, "the places do not determine them"))?;
+        let factor = plan.factorise(&elements).map_err(|_| failed(modelled, "the places do not determine them"))?;
         Ok(Self { grid, places_m, factor })
     }
 

@@ -2,13 +2,17 @@
 
 use tactomo_touch_core::{Room, Table};
 
+use super::Modelled;
 use super::changes::Changes;
 use super::table::{CompileError, Fitted};
-use super::{MOST_CONTACTS, MOST_DIRECTIONS};
-use crate::solve::problem::Problem;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ForwardError;
+
+/// Most contacts that are looked for on a computer.
+pub(crate) const MOST_CONTACTS: usize = 8;
+/// Most directions in which a detector may differ.
+pub(crate) const MOST_DIRECTIONS: usize = 256;
 
 /// Fields of a detector and of what is not known of it, which take long: the same whatever board measures it.
 pub(crate) struct CompiledFields {
@@ -19,34 +23,34 @@ pub(crate) struct CompiledFields {
 /// A detector's table, and what it may differ by, as a board measures it.
 #[derive(Debug)]
 pub(crate) struct CompiledDetector {
-    pub(super) bytes: Vec<u8>,
-    pub(super) electrodes: usize,
-    pub(super) drive_v: f64,
+    pub bytes: Vec<u8>,
+    pub electrodes: usize,
+    pub drive_v: f64,
     /// None of a detector that is known exactly.
-    pub(super) changes: Option<Changes>,
+    pub changes: Option<Changes>,
     /// Numbers and floats that work on it takes room for.
-    pub(super) room: [usize; 2],
+    pub room: [usize; 2],
 }
 
 impl CompiledFields {
-    /// Of a problem's detector, in so many threads.
+    /// Of a detector, in so many threads.
     ///
     /// # Errors
     /// [`ForwardError`] if it is curved, or there are too many electrodes for a table.
-    pub fn of(problem: &Problem, cores: usize) -> Result<Self, ForwardError> {
-        let fitted = Fitted::of(problem).map_err(|error| forward_error(error, problem.detector()))?;
-        let changes = Changes::of(problem, &fitted, cores)?;
+    pub fn of(modelled: Modelled<'_>, cores: usize) -> Result<Self, ForwardError> {
+        let fitted = Fitted::of(modelled).map_err(|error| forward_error(error, modelled.detector))?;
+        let changes = Changes::of(modelled, &fitted, cores)?;
         Ok(Self { fitted, changes })
     }
 
-    /// The detector as a problem measures it.
+    /// The detector as it is measured.
     ///
     /// # Errors
     /// [`ForwardError`] if it may differ in too many directions.
-    pub fn measured(&self, problem: &Problem) -> Result<CompiledDetector, ForwardError> {
-        let detector = problem.detector();
+    pub fn measured(&self, modelled: Modelled<'_>) -> Result<CompiledDetector, ForwardError> {
+        let detector = modelled.detector;
         let refused = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
-        let bytes = self.fitted.table_apart(problem);
+        let bytes = self.fitted.table_apart(modelled);
         let table = Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
         let changes = self.changes.measured(detector);
         let mut room = [0; 2];

@@ -5,16 +5,16 @@
 use nalgebra::DMatrix;
 
 use tactomo_physics::detector::{ForceLaw, Parameter};
-use tactomo_physics::forward::{DiscFields, ForwardError};
+use tactomo_physics::forward::{DiscFields, ForwardError, Nuisance};
 use tactomo_touch_core::Contents;
 use tactomo_touch_core::table::{EVEN_SPREADING, Head, MAX_ELECTRODES, RADII};
 
+use super::Modelled;
 use super::between::{Between, Paired};
 use super::splines::{Grid, Splines};
 use super::unknown::{Unknown, tried_m};
 use crate::solve::fit::linear::full_v;
 use crate::solve::fit::target::{PAD_ERROR, model_error};
-use crate::solve::problem::Problem;
 
 /// Radii of the small and of the wide disc, in usual ones.
 const DISCS: [f64; RADII] = [0.6, 2.2];
@@ -56,12 +56,12 @@ pub enum CompileError {
     },
 }
 
-/// The table of a detector, as it is known and as its board measures it.
+/// The table of a detector as its board measures it, by what is not known of it.
 ///
 /// # Errors
 /// [`CompileError`] if it is curved, has too many electrodes or no model.
-pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
-    Ok(written(problem, &Fitted::of(problem)?, Unknown::of(problem)))
+pub fn compiled(modelled: Modelled<'_>, nuisance: Option<&Nuisance>) -> Result<Vec<u8>, CompileError> {
+    Ok(written(modelled, &Fitted::of(modelled)?, Unknown::of(modelled, nuisance)))
 }
 
 /// What the tables of a detector are fitted with.
@@ -76,12 +76,12 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// Of a problem's detector.
+    /// Of a detector.
     ///
     /// # Errors
     /// [`CompileError`] if it is curved, has too many electrodes or no model.
-    pub fn of(problem: &Problem) -> Result<Self, CompileError> {
-        let detector = problem.detector();
+    pub fn of(modelled: Modelled<'_>) -> Result<Self, CompileError> {
+        let detector = modelled.detector;
         let found = detector.electrodes.len();
         if found > MAX_ELECTRODES {
             return Err(CompileError::Electrodes { detector: detector.name.clone(), found });
@@ -89,10 +89,10 @@ impl Fitted {
         if detector.surface.is_some() {
             return Err(CompileError::Curved { detector: detector.name.clone() });
         }
-        let (paired, between) = Paired::of(problem)?;
-        let splines = Splines::of(problem)?;
+        let (paired, between) = Paired::of(modelled)?;
+        let splines = Splines::of(modelled)?;
         let of_place = |place_m: &[f64; 2]| {
-            let [small, wide] = DISCS.map(|radii| of_disc(problem, *place_m, radii * problem.usual_radius_m()));
+            let [small, wide] = DISCS.map(|radii| of_disc(modelled, *place_m, radii * modelled.radius_m));
             Ok([small?, wide?].concat())
         };
         let values = splines.places_m().iter().map(of_place).collect::<Result<Vec<_>, ForwardError>>()?;
@@ -100,42 +100,42 @@ impl Fitted {
     }
 
     /// The table for who knows [what is not known](super::changes::Changes) of the detector apart from it: of its errors it has those only that no readings tell.
-    pub fn table_apart(&self, problem: &Problem) -> Vec<u8> {
-        let directions = problem.detector().unknowns().directions;
+    pub fn table_apart(&self, modelled: Modelled<'_>) -> Vec<u8> {
+        let directions = modelled.detector.unknowns().directions;
         let conductivity = directions.iter().flatten().filter(|(parameter, _)| *parameter == Parameter::Conductivity);
         let square: f64 = conductivity.map(|(_, step)| step * step).sum();
-        written(problem, self, Unknown { ln_conductance: square.sqrt(), ..Unknown::default() })
+        written(modelled, self, Unknown { ln_conductance: square.sqrt(), ..Unknown::default() })
     }
 }
 
-pub(super) fn failed(problem: &Problem, what: &'static str) -> CompileError {
-    CompileError::Fit { detector: problem.detector().name.clone(), what }
+pub(super) fn failed(modelled: Modelled<'_>, what: &'static str) -> CompileError {
+    CompileError::Fit { detector: modelled.detector.name.clone(), what }
 }
 
 /// All quantities of a disc.
-fn of_disc(problem: &Problem, place_m: [f64; 2], radius_m: f64) -> Result<Vec<f64>, ForwardError> {
-    let DiscFields { electrodes_ohm, own_ohm, share } = problem.model.disc_fields(place_m, radius_m)?;
-    let even_ohm = EVEN_SPREADING / (top_s_per_m(problem) * radius_m);
+fn of_disc(modelled: Modelled<'_>, place_m: [f64; 2], radius_m: f64) -> Result<Vec<f64>, ForwardError> {
+    let DiscFields { electrodes_ohm, own_ohm, share } = modelled.model.disc_fields(place_m, radius_m)?;
+    let even_ohm = EVEN_SPREADING / (top_s_per_m(modelled) * radius_m);
     Ok(electrodes_ohm.into_iter().chain([own_ohm - even_ohm, share]).collect())
 }
 
-fn top_s_per_m(problem: &Problem) -> f64 {
-    problem.detector().layers.last().map_or(1.0, |layer| layer.top_s_per_m)
+fn top_s_per_m(modelled: Modelled<'_>) -> f64 {
+    modelled.detector.layers.last().map_or(1.0, |layer| layer.top_s_per_m)
 }
 
 /// The bytes.
-fn written(problem: &Problem, fitted: &Fitted, unknown: Unknown) -> Vec<u8> {
+fn written(modelled: Modelled<'_>, fitted: &Fitted, unknown: Unknown) -> Vec<u8> {
     let Fitted { splines: Splines { grid, .. }, paired, between, quantities } = fitted;
-    let detector = problem.detector();
+    let detector = modelled.detector;
     let n = detector.electrodes.len();
-    let pads_ohm = problem.model.electrode_fields_ohm();
+    let pads_ohm = modelled.model.electrode_fields_ohm();
     let codes: Vec<_> = quantities.column_iter().map(|column| Code::of(column.as_slice())).collect();
     let coefficients = quantities
         .row_iter()
         .flat_map(|row| row.iter().zip(&codes).map(|(v, code)| code.of_value(*v)).collect::<Vec<_>>());
     let mut bytes = Vec::new();
     Contents {
-        head: head(problem, grid, paired, unknown),
+        head: head(modelled, grid, paired, unknown),
         places_m: &detector.electrodes.iter().map(|pad| pad.place_m().map(|m| m as f32)).collect::<Vec<_>>(),
         sides: grid.sides(),
         pads_ohm: &floats((0..n).flat_map(|e| (0..=e).map(move |g| pads_ohm[(e, g)]))),
@@ -147,7 +147,7 @@ fn written(problem: &Problem, fitted: &Fitted, unknown: Unknown) -> Vec<u8> {
         distances_ohm: &floats(between.distances.iter().copied()),
         walls: &floats(between.walls.iter().copied()),
         codes: &codes.iter().map(|code| [code.zero, code.step].map(|v| v as f32)).collect::<Vec<_>>(),
-        mask: &mask(problem, grid),
+        mask: &mask(modelled, grid),
         coefficients: &coefficients.collect::<Vec<_>>(),
     }
     .write(&mut bytes);
@@ -158,10 +158,10 @@ fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
     values.into_iter().map(|value| value as f32).collect()
 }
 
-fn head(problem: &Problem, grid: &Grid, paired: &Paired, unknown: Unknown) -> Head {
-    let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
+fn head(modelled: Modelled<'_>, grid: &Grid, paired: &Paired, unknown: Unknown) -> Head {
+    let (detector, radius_m) = (modelled.detector, modelled.radius_m);
     // Without one, or where nothing is left of it, there is no scale for forces.
-    let constriction_ohm = constriction_ohm(problem).filter(|ohm| *ohm > 0.0);
+    let constriction_ohm = constriction_ohm(modelled).filter(|ohm| *ohm > 0.0);
     let law = detector.force.as_ref().filter(|_| constriction_ohm.is_some());
     let of_law = |value: fn(&ForceLaw) -> f64| law.map_or(0.0, value) as f32;
     Head {
@@ -176,13 +176,13 @@ fn head(problem: &Problem, grid: &Grid, paired: &Paired, unknown: Unknown) -> He
         drive_v: detector.drive_v as f32,
         on_resistance_ohm: detector.on_resistance_ohm as f32,
         noise_v: detector.adc.deviation_v() as f32,
-        model_share: model_error(&*problem.model).hypot(TABLE_SHARE).hypot(unknown.share) as f32,
+        model_share: model_error(&**modelled.model).hypot(TABLE_SHARE).hypot(unknown.share) as f32,
         shift_m: unknown.place_m as f32,
         ln_conductance_error: unknown.ln_conductance as f32,
         pad_share: PAD_ERROR as f32,
         full_v: full_v(detector) as f32,
         sheet_s: detector.sheet_conductance_s() as f32,
-        top_s_per_m: top_s_per_m(problem) as f32,
+        top_s_per_m: top_s_per_m(modelled) as f32,
         constriction_ohm: constriction_ohm.unwrap_or(1.0) as f32,
         force_s: of_law(|law| law.conductance_at_1_n_s),
         force_exponent: of_law(|law| law.exponent),
@@ -193,15 +193,15 @@ fn head(problem: &Problem, grid: &Grid, paired: &Paired, unknown: Unknown) -> He
 
 /// The constriction that makes conductances, less a disc's own field here, those that the host's meter finds with a spot's own field there (ohm). Both fields are
 /// in the gauge in which the electrodes' mean is zero.
-fn constriction_ohm(problem: &Problem) -> Option<f64> {
-    let radius_m = problem.usual_radius_m();
-    let [x_m, y_m] = tried_m(problem).next()?;
-    let spot = problem.model.spots(radius_m)?.spot([x_m, y_m, 0.0]);
+fn constriction_ohm(modelled: Modelled<'_>) -> Option<f64> {
+    let radius_m = modelled.radius_m;
+    let [x_m, y_m] = tried_m(modelled).next()?;
+    let spot = modelled.model.spots(radius_m)?.spot([x_m, y_m, 0.0]);
     let count = spot.electrodes_ohm.len() as f64;
     let spot_ohm = spot.own_ohm - 2.0 * spot.electrodes_ohm.iter().sum::<f64>() / count;
-    let beyond_even_ohm = *of_disc(problem, [x_m, y_m], radius_m).ok()?.get(spot.electrodes_ohm.len())?;
-    let disc_ohm = beyond_even_ohm + EVEN_SPREADING / (top_s_per_m(problem) * radius_m);
-    Some(problem.constriction_ohm()? - (spot_ohm - disc_ohm))
+    let beyond_even_ohm = *of_disc(modelled, [x_m, y_m], radius_m).ok()?.get(spot.electrodes_ohm.len())?;
+    let disc_ohm = beyond_even_ohm + EVEN_SPREADING / (top_s_per_m(modelled) * radius_m);
+    Some(modelled.constriction_ohm()? - (spot_ohm - disc_ohm))
 }
 
 /// How a quantity's coefficients are stored.
@@ -222,10 +222,10 @@ impl Code {
 }
 
 /// A bit for each cell whose middle is on the detector.
-fn mask(problem: &Problem, grid: &Grid) -> Vec<u8> {
+fn mask(modelled: Modelled<'_>, grid: &Grid) -> Vec<u8> {
     let [columns, rows] = grid.cells;
     let mut bytes = vec![0; (columns * rows).div_ceil(8)];
-    for (index, is_on) in grid.on_detector(&problem.detector().outline).enumerate() {
+    for (index, is_on) in grid.on_detector(&modelled.detector.outline).enumerate() {
         bytes[index / 8] |= u8::from(is_on) << (index % 8);
     }
     bytes

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::Modelled;
 use super::splines::Grid;
 use super::table::{CompileError, failed};
-use crate::solve::problem::Problem;
 use tactomo_physics::detector::Outline;
 use tactomo_physics::forward::ForwardModel;
 use tactomo_physics::forward::spots::Spot;
@@ -37,7 +37,7 @@ pub(super) struct Between {
 }
 
 /// The spline over the lengths of ways between places.
-pub(super) struct Ways {
+pub(crate) struct Ways {
     /// Distance that it begins at (m).
     pub near_m: f64,
     /// Step of `ln r`.
@@ -47,14 +47,14 @@ pub(super) struct Ways {
 }
 
 impl Ways {
-    /// On a problem's detector.
-    pub fn of(problem: &Problem) -> Self {
-        let (outline, radius_m) = (&problem.detector().outline, problem.usual_radius_m());
+    /// On a detector.
+    pub fn of(modelled: Modelled<'_>) -> Self {
+        let (outline, radius_m) = (&modelled.detector.outline, modelled.radius_m);
         let [low_m, high_m] = outline.bounds();
         // By walls, ways are twice as long.
         let far_m = 2.0 * (high_m[0] - low_m[0]).hypot(high_m[1] - low_m[1]);
         let ln_step = (far_m / radius_m).ln() / (KNOTS - 3) as f64;
-        let is_rectangle = Grid::of(problem).on_detector(outline).all(|is_on| is_on);
+        let is_rectangle = Grid::of(modelled).on_detector(outline).all(|is_on| is_on);
         Self { near_m: radius_m, ln_step, walls_m: is_rectangle.then_some([low_m, high_m]) }
     }
 
@@ -86,22 +86,23 @@ struct Sampled {
 }
 
 impl Paired {
-    /// Of a problem's detector, with the fit of its own fields.
+    /// Of a detector, with the fit of its own fields.
     ///
     /// # Errors
     /// [`CompileError::Fit`] if its model has no spots, or places do not determine the fit.
-    pub fn of(problem: &Problem) -> Result<(Self, Between), CompileError> {
-        let radius_m = problem.usual_radius_m();
-        let fields = problem.model.spots(radius_m).ok_or_else(|| failed(problem, "the model has no small contacts"))?;
-        let n = problem.detector().electrodes.len();
-        let outline = &problem.detector().outline;
+    pub fn of(modelled: Modelled<'_>) -> Result<(Self, Between), CompileError> {
+        let radius_m = modelled.radius_m;
+        let fields =
+            modelled.model.spots(radius_m).ok_or_else(|| failed(modelled, "the model has no small contacts"))?;
+        let n = modelled.detector.electrodes.len();
+        let outline = &modelled.detector.outline;
         let spread_m = fields.places_m(SPREAD * n).into_iter().map(|[x_m, y_m, _]| [x_m, y_m]);
         let spread_m: Vec<_> = spread_m.filter(|place_m| outline.holds(*place_m)).collect();
         let unknowns = KNOTS + (n + 1) * (n + 2) / 2;
         let (places_m, pairs) = paired(spread_m, outline, radius_m, PAIRS * unknowns);
-        let ways = Ways::of(problem);
-        let sampled = Sampled::of(&*problem.model, radius_m, &places_m, &pairs)
-            .ok_or_else(|| failed(problem, "the model has no small contacts"))?;
+        let ways = Ways::of(modelled);
+        let sampled = Sampled::of(&**modelled.model, radius_m, &places_m, &pairs)
+            .ok_or_else(|| failed(modelled, "the model has no small contacts"))?;
         let scale_ohm = sampled.fields_ohm.iter().flatten().fold(0.0f64, |most, ohm| most.max(ohm.abs()));
         let bases: Vec<_> = sampled.fields_ohm.iter().map(|fields| basis(fields, scale_ohm)).collect();
         let mut design = DMatrix::zeros(pairs.len(), unknowns);
@@ -114,7 +115,7 @@ impl Paired {
         let mut matrix = design.transpose() * &design;
         (0..matrix.nrows()).for_each(|i| matrix[(i, i)] += RIDGE * (1.0 + matrix[(i, i)]));
         let factor =
-            Cholesky::new(matrix).ok_or_else(|| failed(problem, "places do not determine what is between them"))?;
+            Cholesky::new(matrix).ok_or_else(|| failed(modelled, "places do not determine what is between them"))?;
         let mut paired = Self {
             ways,
             places_m,
@@ -238,6 +239,7 @@ fn equation(ways: impl Iterator<Item = f64>, [a, b]: [&[f64]; 2], row: &mut [f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::Problem;
     use tactomo_physics::detector::Detector;
 
     /// Near and far, in the middle and at walls, also where electrodes are many and the layer is thin.
@@ -245,8 +247,9 @@ mod tests {
     fn fields_between_places_are_the_models() {
         for name in ["square-60", "display-140x70"] {
             let problem = Problem::of(&Detector::preset(name).unwrap()).unwrap();
-            let (paired, between) = Paired::of(&problem).unwrap();
-            let outline = &problem.detector().outline;
+            let modelled = problem.modelled();
+            let (paired, between) = Paired::of(modelled).unwrap();
+            let outline = &modelled.detector.outline;
             let [low_m, high_m] = outline.bounds();
             let (mut places_m, mut pairs) = (Vec::new(), Vec::new());
             let mut random = fastrand::Rng::with_seed(7);
@@ -259,7 +262,7 @@ mod tests {
                     places_m.extend([at_m, to_m]);
                 }
             }
-            let sampled = Sampled::of(&*problem.model, paired.ways.near_m, &places_m, &pairs).unwrap();
+            let sampled = Sampled::of(&**modelled.model, paired.ways.near_m, &places_m, &pairs).unwrap();
             let all: Vec<_> = between.distances.iter().chain(&between.walls).collect();
             let mut row = vec![0.0; all.len()];
             let (mut off, mut square) = (0.0, 0.0);
