@@ -1,25 +1,25 @@
 //! A few contacts on a detector as a small circuit: the readings that they give, and how these change with them.
 //!
-//! Each contact is a disc that carries one current, and a couple of opposed ones along x and along y that a slope of the potential under it drives. With
-//! the fields of the electrodes at the contacts `F` (`K x n`), those between contacts `N`, and a resistance `A` for each, of the contact with
-//! the current that crowds under it,
+//! Each contact is a [disc](crate::disc) that carries one current, couples of opposed ones along x and along y that a slope of the potential under it drives, and two quadrupoles that its
+//! bends drive. With the fields of the electrodes at the contacts `F` (`K x n`), those between contacts `N`, and a resistance `A` for each, of the contact with the current that
+//! crowds under it,
 //!
 //! ```text
-//! M = [ N + diag(A)  1 ]    U = M^-1 [F; 1]    Z = E - [F; 1]' U - sum over k, d of a_k w_kd w_kd'
+//! M = [ N + diag(A)  1 ]    U = M^-1 [F; 1]    Z = E - [F; 1]' U - sum over k of a_k (w_kx w_kx' + w_ky w_ky') + b_k (g_k g_k' + h_k h_k')
 //!     [     1'       0 ]    w_kd = dF_k/dx_d - sum over l of dN_kl/dx_d U_l
 //! ```
 //!
-//! `U` are the currents that an electrode's ampere makes at the contacts, `w` the slopes of the potential under them (in the couples' term less `dA_k/dx_d U_k / 2`,
-//! the contact's own field), and `a` (S m2) what moment a slope drives:
-//! `C R^2 / 4` of a light disc whose current is even, `8/3 s R^3` of a perfect one on a deep layer of conductivity `s` (a conducting disc
-//! in a field along it: Landau and Lifshitz, Electrodynamics of Continuous Media, paragraph 4, of which a layer sees one side), `2 pi R^2 s t` on a thin one (a
-//! conducting cylinder across it). Between the two of a perfect one it is taken as if squares of their reciprocals added, and of a light and a perfect one as if both
-//! were in series. The same `w` are the derivatives by a contact's place: `dZ = -(w U_k' + U_k w')`, and by its resistance `dZ = A U_k U_k'` in logarithms.
+//! `U` are the currents that an electrode's ampere makes at the contacts, `w` the slopes of the potential under them, `g` half of its bend along x less that along y and `h` that along both,
+//! `a` (S m2) and `b` (S m4) what moments these drive. Slopes and bends are taken over discs of the moments' own currents, and less what of them the contact's own field makes: half of
+//! its slope, and of its bend a quarter, as at a mirror. Without the quadrupoles a firm disc of a third of the electrodes' distance is told as two.
+//!
+//! The same `w`, over the disc of the current, are the derivatives by a contact's place: `dZ = -(w U_k' + U_k w')`, and by its resistance `dZ = A U_k U_k'` in logarithms.
 //! Beside those the couples change: `-(a (dw w' + w dw') + da w w')`, with `dw` from second derivatives of the fields, which are large at walls, where the slope across
-//! them vanishes. What `dw` owes to other contacts is left out.
+//! them vanishes. What `dw` owes to other contacts is left out, and of the quadrupoles all but `db`.
 //!
 //! A current that crowds at the rim has the fields of an even one on a wider disc. What is fitted is the radius of that disc, the spread.
 
+use crate::disc::Disc;
 use crate::fields::Sample;
 use crate::head::Head;
 use crate::real::Real;
@@ -27,22 +27,15 @@ use crate::table::{LEAST_SHARE, MAX_ELECTRODES, Table};
 use crate::unknown::Detector;
 use crate::vector::PARAMETERS;
 
-/// By what share that of a disc of even potential, `1 / (4 s R)`, is less.
-const CROWDED_LESS: f32 = 0.074_7;
-/// By what share the mean square of the distance from the middle is more where all current is crowded, as `1 / sqrt(1 - (r / R)^2)`: it is `2/3 R^2`, of
-/// even current `1/2 R^2`.
-const CROWDED_WIDER: f32 = 1.0 / 3.0;
 /// Error of a contact's own field, as a share of that of even current: of firm discs in random scenes on `square-60` and `display-140x70`, found with the radius to
 /// 8 %, it is 0.02 in the middle.
 const OWN_ERROR: f32 = 0.03;
-/// Steps in which crowding and radius are found, each of the other.
-const CROWDING_STEPS: usize = 3;
+/// Square of the radius of the disc over which bends are taken, in those of the spread: between that of couples, 0.6 to 0.67, and that of quadrupoles, 0.43 to 0.5.
+pub(crate) const BENT: f32 = 0.55;
 /// Share of a number by which it is changed for a derivative.
 const STEP: f32 = 0.01;
 /// Changes of what drives the couples of currents: of its two parts by a place's two and by the radius, less one that two have in common.
 pub(crate) const TURNED: usize = 5;
-/// Largest conductance of a contact (sheet conductances): what is firmer makes no difference.
-const FIRMEST_SHEETS: f32 = 300.0;
 /// Smallest resistance of a contact with its own field, in those of even current: with less, fields are no longer those of contacts.
 const LEAST_OHM: f32 = 0.8;
 
@@ -64,34 +57,6 @@ impl<T: Real> Spot<T> {
 
 /// A vector over electrodes.
 pub(crate) type PerElectrode<T> = [T; MAX_ELECTRODES];
-
-/// How the current of a disc crowds.
-struct Disc<T> {
-    radius_m: T,
-    rest_ohm: T,
-    moment_s_m2: T,
-}
-
-impl<T: Real> Disc<T> {
-    /// Of a disc whose current spreads so far, with an own field but for that on a deep layer, and a resistance with that of the crowded current.
-    fn of(head: &Head, spread_m: T, field_ohm: T, ohm: T) -> Self {
-        let least_ohm = T::ONE / (T::of(FIRMEST_SHEETS) * T::of(head.sheet_s));
-        let (mut crowded, mut radius_m, mut rest_ohm) = (T::of(0.5), spread_m, least_ohm);
-        for _ in 0..CROWDING_STEPS {
-            radius_m = spread_m / (T::ONE + T::of(CROWDED_WIDER) * crowded).sqrt();
-            let even_ohm = head.even_ohm(radius_m);
-            rest_ohm = (ohm - field_ohm - even_ohm * (T::ONE - T::of(CROWDED_LESS) * crowded)).max(least_ohm);
-            // Crowded is so much of the current as the layer's resistance has of that of both.
-            crowded = even_ohm / (even_ohm + rest_ohm);
-        }
-        let (deep, thin) = (
-            T::of(3.0) / (T::of(8.0) * T::of(head.top_s_per_m) * radius_m),
-            T::ONE / (T::of(core::f64::consts::TAU) * T::of(head.sheet_s)),
-        );
-        let of_layer = (deep * deep + thin * thin).sqrt();
-        Self { radius_m, rest_ohm, moment_s_m2: radius_m * radius_m / (T::of(4.0) * rest_ohm + of_layer) }
-    }
-}
 
 /// One contact in the circuit.
 #[derive(Clone, Debug)]
@@ -116,18 +81,25 @@ pub(crate) struct Loaded<T> {
     even_ohm: T,
     /// Change of the way from the small to the wide disc with the logarithm of the spread.
     per_ln_radius: T,
-    /// Moment of current that a slope of potential drives (S m2).
+    /// Couple of currents that a slope of potential drives (S m2), and quadrupole that a bend does (S m4).
     pub moment_s_m2: T,
+    pub quadrupole_s_m4: T,
     /// Its derivative by the contact's own field (S m2/ohm).
     pub moment_by_own: T,
-    /// Half of its derivatives by the parameters.
+    /// Half of their derivatives by the parameters.
     pub half_moment_by: [T; PARAMETERS],
+    pub half_quadrupole_by: [T; PARAMETERS],
+    /// How far the slopes that drive couples are from those of the spread's disc to the wide one's, and what of a change of the spread they change.
+    driving_wide: T,
+    pub driving_share: T,
     /// Currents for 1 A into each electrode.
     pub currents: PerElectrode<T>,
     /// Slopes of the potential along x and y (ohm/m), likewise.
     pub slopes_ohm_per_m: [PerElectrode<T>; 2],
-    /// Slopes that drive the couples of currents (ohm/m): those less half of the slope of the contact's own field.
+    /// Slopes that drive the couples of currents (ohm/m): those, over the couples' disc, less half of the slope of the contact's own field.
     pub driving_ohm_per_m: [PerElectrode<T>; 2],
+    /// Bends that drive the quadrupoles (ohm/m2): half of that along x less that along y, and that along both.
+    pub bending_ohm_per_m2: [PerElectrode<T>; 2],
 }
 
 impl<T: Real> Loaded<T> {
@@ -143,11 +115,16 @@ impl<T: Real> Loaded<T> {
         even_ohm: T::ZERO,
         per_ln_radius: T::ZERO,
         moment_s_m2: T::ZERO,
+        quadrupole_s_m4: T::ZERO,
         moment_by_own: T::ZERO,
         half_moment_by: [T::ZERO; PARAMETERS],
+        half_quadrupole_by: [T::ZERO; PARAMETERS],
+        driving_wide: T::ZERO,
+        driving_share: T::ZERO,
         currents: [T::ZERO; MAX_ELECTRODES],
         slopes_ohm_per_m: [[T::ZERO; MAX_ELECTRODES]; 2],
         driving_ohm_per_m: [[T::ZERO; MAX_ELECTRODES]; 2],
+        bending_ohm_per_m2: [[T::ZERO; MAX_ELECTRODES]; 2],
     };
 
     /// Puts a contact there.
@@ -157,7 +134,8 @@ impl<T: Real> Loaded<T> {
         let [small_m2, wide_m2] = head.radii_m.map(|radius_m| T::of(radius_m) * T::of(radius_m));
         let per_m2 = T::ONE / (wide_m2 - small_m2);
         self.spot = spot;
-        detector.sample(spot.at_m, per_m2 * (spread_m * spread_m - small_m2), &mut self.sample);
+        let [wide, bent] = [T::ONE, T::of(BENT)].map(|share| per_m2 * (share * spread_m * spread_m - small_m2));
+        detector.sample(spot.at_m, wide, bent, &mut self.sample);
         self.share = self.sample.value[n + 1].clamp(T::of(LEAST_SHARE), T::ONE);
         self.ohm = spot.ln_ohm.exp().max(T::of(LEAST_OHM) * (self.sample.value[n] + head.even_ohm(spread_m)));
         self.per_ln_radius = T::of(2.0) * per_m2 * spread_m * spread_m;
@@ -173,25 +151,39 @@ impl<T: Real> Loaded<T> {
         let (ohm, own_ohm) = (self.ohm, self.sample.value[n]);
         let disc = Disc::of(head, spread_m, own_ohm, ohm);
         (self.radius_m, self.rest_ohm, self.even_ohm) = (disc.radius_m, disc.rest_ohm, head.even_ohm(disc.radius_m));
-        self.moment_s_m2 = disc.moment_s_m2;
-        let half_by = |other: Disc<T>, step: T| T::of(0.5) * (other.moment_s_m2 - disc.moment_s_m2) / step;
+        (self.moment_s_m2, self.quadrupole_s_m4) = (disc.couple_s_m2, disc.quadrupole_s_m4);
+        let spread_m2 = spread_m * spread_m;
+        self.driving_share = disc.driving_m2 / spread_m2;
+        self.driving_wide = T::of(0.5) * self.per_ln_radius * (self.driving_share - T::ONE);
+        let half_by = |other: Disc<T>, step: T| {
+            let half = T::of(0.5) / step;
+            [half * (other.couple_s_m2 - disc.couple_s_m2), half * (other.quadrupole_s_m4 - disc.quadrupole_s_m4)]
+        };
         let by_ln_ohm = half_by(Disc::of(head, spread_m, own_ohm, ohm * (T::ONE + T::of(STEP))), T::of(STEP));
         let by_own = half_by(Disc::of(head, spread_m, own_ohm - T::of(STEP) * ohm, ohm), -T::of(STEP) * ohm);
         let by_ln_radius = half_by(Disc::of(head, spread_m * (T::ONE + T::of(STEP)), own_ohm, ohm), T::of(STEP));
-        let by_place = |d: usize| by_own * T::of(head.radius_m) * self.sample.slope[d][n];
-        let by_wider = by_own * self.per_ln_radius * self.sample.wider[n];
-        self.moment_by_own = T::of(2.0) * by_own;
-        self.half_moment_by = [by_place(0), by_place(1), by_ln_ohm, by_ln_radius + by_wider];
+        let [x, y] = [0, 1].map(|d| T::of(head.radius_m) * self.sample.slope[d][n]);
+        let wider = self.per_ln_radius * self.sample.wider[n];
+        let all = |i: usize| [by_own[i] * x, by_own[i] * y, by_ln_ohm[i], by_ln_radius[i] + by_own[i] * wider];
+        self.moment_by_own = T::of(2.0) * by_own[0];
+        (self.half_moment_by, self.half_quadrupole_by) = (all(0), all(1));
+    }
+
+    /// What electrodes and the contact's own field make of the bends at it, by the currents of an electrode. Of the own field's bend a mirror makes a quarter.
+    fn bends(&self, values: impl Fn(&[T]) -> T) -> [T; 2] {
+        let [xx, xy, yy] = [0, 1, 2].map(|which| values(&self.sample.turning[which]));
+        [T::of(0.5) * (xx - yy), xy]
     }
 
     /// Finds what drives the couples of currents at an electrode, and how that changes.
     fn drive(&mut self, head: &Head, n: usize, e: usize) {
         let half = T::of(0.5) * self.currents[e];
         for d in 0..2 {
-            self.driving_ohm_per_m[d][e] = self.slopes_ohm_per_m[d][e] - half * self.sample.slope[d][n];
+            let over_disc = self.slopes_ohm_per_m[d][e] + self.driving_wide * self.sample.turning[3 + d][e];
+            self.driving_ohm_per_m[d][e] = over_disc - half * self.sample.slope[d][n];
         }
         let by_place = self.moment_s_m2 * T::of(head.radius_m);
-        let by_radius = self.moment_s_m2 * self.per_ln_radius;
+        let by_radius = self.moment_s_m2 * self.driving_share * self.per_ln_radius;
         let units = [by_place, by_place, by_place, by_radius, by_radius];
         for (turning, unit) in self.sample.turning.iter_mut().zip(units) {
             turning[e] = unit * (turning[e] - half * turning[n]);
@@ -235,8 +227,9 @@ pub(crate) struct Circuit<T, const K: usize> {
     pub loads_ohm: PerElectrode<T>,
     /// Currents that flow for potentials at the contacts besides (S): symmetric.
     pub inverse_s: [[T; K]; K],
-    /// Slopes of the field at a contact from another one (ohm/m), by the place of the first.
+    /// Slopes (ohm/m) and bends (ohm/m2) of the field at a contact from another one, by the place of the first.
     pub slopes_ohm_per_m: [[[T; 2]; K]; K],
+    bends_ohm_per_m2: [[[T; 2]; K]; K],
 }
 
 impl<T: Real, const K: usize> Circuit<T, K> {
@@ -247,6 +240,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         loads_ohm: [T::ZERO; MAX_ELECTRODES],
         inverse_s: [[T::ZERO; K]; K],
         slopes_ohm_per_m: [[[T::ZERO; 2]; K]; K],
+        bends_ohm_per_m2: [[[T::ZERO; 2]; K]; K],
     };
 
     /// Solves for some contacts, `K` at most; `false` if their fields cannot be those of contacts, as when two are at one place.
@@ -259,9 +253,10 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         for k in 0..self.count {
             matrix[k][k] = self.loaded[k].ohm;
             for l in 0..k {
-                let (ohm, [at_k, at_l]) = self.between(detector, k, l);
+                let (ohm, [at_k, at_l], [bends_k, bends_l]) = self.between(detector, k, l);
                 (matrix[k][l], matrix[l][k]) = (ohm, ohm);
                 (self.slopes_ohm_per_m[k][l], self.slopes_ohm_per_m[l][k]) = (at_k, at_l);
+                (self.bends_ohm_per_m2[k][l], self.bends_ohm_per_m2[l][k]) = (bends_k, bends_l);
             }
         }
         self.find_currents(detector.table, &matrix) && {
@@ -270,11 +265,11 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         }
     }
 
-    /// Field between two contacts (ohm), and its derivatives by the place of each of both (ohm/m).
-    fn between(&self, detector: &Detector<'_, T>, k: usize, l: usize) -> (T, [[T; 2]; 2]) {
+    /// Field between two contacts (ohm), its derivatives by the place of each of both (ohm/m), and its bends there (ohm/m2).
+    fn between(&self, detector: &Detector<'_, T>, k: usize, l: usize) -> (T, [[T; 2]; 2], [[T; 2]; 2]) {
         let (one, other) = (&self.loaded[k], &self.loaded[l]);
         let n = detector.table.electrodes();
-        let (mut ohm, mut slopes) = detector.by_ways_ohm(one.spot.at_m, other.spot.at_m);
+        let (mut ohm, mut slopes, mut bends) = detector.by_ways_ohm(one.spot.at_m, other.spot.at_m);
         ohm += other.walls_ohm[n];
         for e in 0..n {
             ohm += other.walls_ohm[e] * one.sample.value[e];
@@ -282,8 +277,12 @@ impl<T: Real, const K: usize> Circuit<T, K> {
                 slopes[0][d] += other.walls_ohm[e] * one.sample.slope[d][e];
                 slopes[1][d] += one.walls_ohm[e] * other.sample.slope[d][e];
             }
+            for (bends, (here, there)) in bends.iter_mut().zip([(one, other), (other, one)]) {
+                let of_fields = here.bends(|values| values[e]);
+                bends.iter_mut().zip(of_fields).for_each(|(sum, bend)| *sum += there.walls_ohm[e] * bend);
+            }
         }
-        (ohm, slopes)
+        (ohm, slopes, bends)
     }
 
     fn find_currents(&mut self, table: &Table<'_>, matrix: &[[T; K]; K]) -> bool {
@@ -347,6 +346,16 @@ impl<T: Real, const K: usize> Circuit<T, K> {
             }
             self.take_widened(table, k);
             let n = table.electrodes();
+            for e in 0..n {
+                let others = (0..self.count).filter(|l| *l != k);
+                let [by_others, across] = others.fold([T::ZERO; 2], |sums, l| {
+                    [0, 1].map(|d| sums[d] + self.bends_ohm_per_m2[k][l][d] * self.loaded[l].currents[e])
+                });
+                let one = &mut self.loaded[k];
+                let quarter = T::of(0.25) * one.currents[e];
+                let [even, both] = one.bends(|values| values[e] - quarter * values[n]);
+                (one.bending_ohm_per_m2[0][e], one.bending_ohm_per_m2[1][e]) = (even - by_others, both - across);
+            }
             (0..n).for_each(|e| self.loaded[k].drive(table.head(), n, e));
         }
     }
@@ -368,8 +377,10 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         for g in 0..detector.table.electrodes() {
             let mut ohm = detector.pads_ohm(g, g) - self.constant_ohm[g] + detector.switch_ohm();
             for one in &self.loaded[..self.count] {
-                let [x, y] = [0, 1].map(|d| one.driving_ohm_per_m[d][g]);
-                ohm -= one.sample.value[g] * one.currents[g] + one.moment_s_m2 * (x * x + y * y);
+                let square = |two: &[PerElectrode<T>; 2]| two[0][g] * two[0][g] + two[1][g] * two[1][g];
+                ohm -= one.sample.value[g] * one.currents[g]
+                    + one.moment_s_m2 * square(&one.driving_ohm_per_m)
+                    + one.quadrupole_s_m4 * square(&one.bending_ohm_per_m2);
             }
             if !(ohm > T::ZERO && ohm.is_finite()) {
                 return false;
@@ -387,12 +398,12 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         for (e, volts) in volts.iter_mut().enumerate().take(detector.table.electrodes()) {
             let mut ohm = own_ohm - detector.pads_ohm(e, g);
             for one in &self.loaded[..self.count] {
-                let along = |d: usize| {
-                    let here = one.driving_ohm_per_m[d][g];
-                    here * (here - one.driving_ohm_per_m[d][e])
+                let less = |two: &[PerElectrode<T>; 2]| {
+                    two[0][g] * (two[0][g] - two[0][e]) + two[1][g] * (two[1][g] - two[1][e])
                 };
                 ohm -= (one.sample.value[g] - one.sample.value[e]) * one.currents[g]
-                    + one.moment_s_m2 * (along(0) + along(1));
+                    + one.moment_s_m2 * less(&one.driving_ohm_per_m)
+                    + one.quadrupole_s_m4 * less(&one.bending_ohm_per_m2);
             }
             *volts = per_ohm * ohm;
         }

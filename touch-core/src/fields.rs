@@ -68,8 +68,8 @@ impl<'a> Table<'a> {
         self.coefficients.get(start..start + 2 * count).map_or(&[], |bytes| bytes.as_chunks().0)
     }
 
-    /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives.
-    pub(crate) fn sample<T: Real>(&self, at_m: [T; 2], wide: T, sample: &mut Sample<T>) {
+    /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives; second ones as far as `bent` says.
+    pub(crate) fn sample<T: Real>(&self, at_m: [T; 2], wide: T, bent: T, sample: &mut Sample<T>) {
         let count = self.electrodes + OTHERS;
         let stencil = Stencil::of(self, at_m);
         *sample = Sample::NONE;
@@ -80,12 +80,13 @@ impl<'a> Table<'a> {
             for (index, (small, large)) in small.iter().zip(large).enumerate() {
                 let [small, large]: [T; 2] = [self.decoded(index, *small), self.decoded(count + index, *large)];
                 let code = small + wide * (large - small);
+                let bent = small + bent * (large - small);
                 sample.value[index] += value * code;
                 sample.slope[0][index] += slope_x * code;
                 sample.slope[1][index] += slope_y * code;
                 let (bends, widened) = sample.turning.split_at_mut(bend.len());
                 for (sum, bend) in bends.iter_mut().zip(bend) {
-                    sum[index] += bend * code;
+                    sum[index] += bend * bent;
                 }
                 sample.wider[index] += value * (large - small);
                 for (sum, slope) in widened.iter_mut().zip([slope_x, slope_y]) {

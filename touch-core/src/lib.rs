@@ -28,6 +28,7 @@ mod births;
 mod circuit;
 mod contents;
 mod crc;
+mod disc;
 mod evidence;
 mod fields;
 mod fit;

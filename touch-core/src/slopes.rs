@@ -12,12 +12,18 @@ pub(crate) struct Pattern<T> {
     /// Changes of the field at the contact for a step of its place along x and along y, in usual radii, and of its radius' logarithm (ohm).
     along: [T; 3],
     driving: [T; 2],
+    bending: [T; 2],
     turned: [T; TURNED],
 }
 
 impl<T: Real> Pattern<T> {
-    pub const NONE: Self =
-        Self { current: T::ZERO, along: [T::ZERO; 3], driving: [T::ZERO; 2], turned: [T::ZERO; TURNED] };
+    pub const NONE: Self = Self {
+        current: T::ZERO,
+        along: [T::ZERO; 3],
+        driving: [T::ZERO; 2],
+        bending: [T::ZERO; 2],
+        turned: [T::ZERO; TURNED],
+    };
 
     /// Of a contact, summed over electrodes by `sum`.
     pub fn of(one: &Loaded<T>, unit_m: T, sum: impl Fn(&[T]) -> T) -> Self {
@@ -26,6 +32,7 @@ impl<T: Real> Pattern<T> {
             current: sum(&one.currents),
             along: [x, y, sum(&one.by_radius_ohm)],
             driving: one.driving_ohm_per_m.each_ref().map(|driving| sum(driving)),
+            bending: one.bending_ohm_per_m2.each_ref().map(|bending| sum(bending)),
             turned: one.sample.turning.each_ref().map(|turning| sum(turning)),
         }
     }
@@ -35,6 +42,7 @@ impl<T: Real> Pattern<T> {
         self.current += share * other.current;
         self.along.iter_mut().zip(other.along).for_each(|(sum, along)| *sum += share * along);
         self.driving.iter_mut().zip(other.driving).for_each(|(sum, driving)| *sum += share * driving);
+        self.bending.iter_mut().zip(other.bending).for_each(|(sum, bending)| *sum += share * bending);
         self.turned.iter_mut().zip(other.turned).for_each(|(sum, turned)| *sum += share * turned);
     }
 
@@ -43,16 +51,15 @@ impl<T: Real> Pattern<T> {
         let both = |a: T, of_a: T, b: T, of_b: T| a * of_b + b * of_a;
         let moved = |p: usize| both(self.along[p], self.current, other.along[p], other.current);
         let turned = |t: usize, d: usize| both(self.turned[t], self.driving[d], other.turned[t], other.driving[d]);
-        let driven = T::of(2.0) * (self.driving[0] * other.driving[0] + self.driving[1] * other.driving[1]);
+        let twice = |a: [T; 2], b: [T; 2]| T::of(2.0) * (a[0] * b[0] + a[1] * b[1]);
+        let (driven, bent) = (twice(self.driving, other.driving), twice(self.bending, other.bending));
         let fields = [
             moved(0) + turned(0, 0) + turned(1, 1),
             moved(1) + turned(1, 0) + turned(2, 1),
             -one.ohm * self.current * other.current,
             moved(2) + turned(3, 0) + turned(4, 1),
         ];
-        let mut changes = one.half_moment_by.map(|half| -half * driven);
-        changes.iter_mut().zip(fields).for_each(|(change, field)| *change -= field);
-        changes
+        core::array::from_fn(|p| -one.half_moment_by[p] * driven - one.half_quadrupole_by[p] * bent - fields[p])
     }
 }
 

@@ -369,8 +369,9 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         means: &mut Means<'_, '_, T>,
     ) -> Option<Answer<T, K>> {
         let readings = task.readings();
-        // Nothing is left, or far less unexplained: what did not fit is gone.
-        let has_changed = found.is_none_or(|fit| self.search.more && T::of(WORSE) * fit.cost < self.searched);
+        // Nothing is left of what there was, or far less unexplained: what did not fit is gone.
+        let has_changed =
+            found.map_or(self.scene.count > 0, |fit| self.search.more && T::of(WORSE) * fit.cost < self.searched);
         if has_changed {
             self.wait = 0;
         }

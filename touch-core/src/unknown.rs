@@ -327,9 +327,9 @@ impl<'a, T: Real> Detector<'a, T> {
         Self { table, moved: None }
     }
 
-    /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives.
-    pub fn sample(&self, at_m: [T; 2], wide: T, sample: &mut Sample<T>) {
-        self.table.sample(at_m, wide, sample);
+    /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives; second ones as far as `bent` says.
+    pub fn sample(&self, at_m: [T; 2], wide: T, bent: T, sample: &mut Sample<T>) {
+        self.table.sample(at_m, wide, bent, sample);
         if let Some((unknown, moved)) = &self.moved {
             unknown.add(self.table, moved.shares, at_m, sample);
         }
@@ -362,30 +362,39 @@ impl<'a, T: Real> Detector<'a, T> {
             .map_or(T::ONE, |(unknown, moved)| moved.gains[e] + moved.bows_v[e] * unknown.bow(e, volts)[1])
     }
 
-    /// The part of the field between two places that goes by the ways between them: its value (ohm), and its derivatives by each of both (ohm/m).
-    pub fn by_ways_ohm(&self, to_m: [T; 2], from_m: [T; 2]) -> (T, [[T; 2]; 2]) {
-        let (mut ohm, mut slopes) = (T::ZERO, [[T::ZERO; 2]; 2]);
+    /// The part of the field between two places that goes by the ways between them: its value (ohm), its derivatives by each of both (ohm/m), and the bends there (ohm/m2):
+    /// half of that along x less that along y, and that along both.
+    pub fn by_ways_ohm(&self, to_m: [T; 2], from_m: [T; 2]) -> (T, [[T; 2]; 2], [[T; 2]; 2]) {
+        let (mut ohm, mut slopes, mut bends) = (T::ZERO, [[T::ZERO; 2]; 2], [[T::ZERO; 2]; 2]);
         for (way_m, turns) in turned_ways_m(to_m, from_m, self.table.walls_m()) {
             let distance_m = (way_m[0] * way_m[0] + way_m[1] * way_m[1]).sqrt().max(T::of(1e-9));
-            let (part_ohm, per_m) = self.by_distance_ohm(distance_m);
+            let (part_ohm, per_m, per_m2) = self.by_distance_ohm(distance_m);
             ohm += part_ohm;
             let per_m = per_m / distance_m;
             for d in 0..2 {
                 slopes[0][d] += per_m * way_m[d];
                 slopes[1][d] += per_m * turns[d] * way_m[d];
             }
+            // Turned, both ways along an axis bend alike, and those along both once as much and once less.
+            let bend = (per_m2 - per_m) / (distance_m * distance_m);
+            let even = T::of(0.5) * bend * (way_m[0] * way_m[0] - way_m[1] * way_m[1]);
+            let both = bend * way_m[0] * way_m[1];
+            for (bends, turned) in bends.iter_mut().zip([T::ONE, turns[0] * turns[1]]) {
+                bends[0] += even;
+                bends[1] += turned * both;
+            }
         }
-        (ohm, slopes)
+        (ohm, slopes, bends)
     }
 
-    /// What a way adds to that by its length (m): its value (ohm), and its derivative by that (ohm/m).
-    pub(crate) fn by_distance_ohm(&self, distance_m: T) -> (T, T) {
+    /// What a way adds to that by its length (m): its value (ohm), and its first and second derivatives by that (ohm/m, ohm/m2).
+    pub(crate) fn by_distance_ohm(&self, distance_m: T) -> (T, T, T) {
         let at = |k: usize| {
             self.moved.as_ref().map_or_else(|| T::of(self.table.distance_ohm(k)), |(_, moved)| moved.distances_ohm[k])
         };
         let knots = Knots::of(self.table, distance_m);
         let sum = |weights: &[T; 4]| (0..4).map(|k| weights[k] * at(knots.first + k)).sum::<T>();
-        (sum(&knots.value), sum(&knots.slope))
+        (sum(&knots.value), sum(&knots.slope), sum(&knots.bend))
     }
 
     /// `Q b` of the fields at a place.
@@ -422,9 +431,10 @@ impl Table<'_> {
 struct Knots<T> {
     /// The first of four.
     first: usize,
-    /// Weights in the value, and in the derivative by the distance (1/m).
+    /// Weights in the value, and in the derivatives by the distance (1/m, 1/m2).
     value: [T; 4],
     slope: [T; 4],
+    bend: [T; 4],
 }
 
 impl<T: Real> Knots<T> {
@@ -435,6 +445,9 @@ impl<T: Real> Knots<T> {
         let distance_m = distance_m.max(near_m);
         let (first, t) = interval((distance_m / near_m).ln() / ln_step, table.knots() - 3);
         let weights = weights(t);
-        Self { first, value: weights.value, slope: weights.slope.map(|slope| slope / (ln_step * distance_m)) }
+        let per_m = T::ONE / (ln_step * distance_m);
+        let bend = |k: usize| per_m * (per_m * weights.bend[k] - weights.slope[k] / distance_m);
+        let slope = weights.slope.map(|slope| per_m * slope);
+        Self { first, value: weights.value, slope, bend: core::array::from_fn(bend) }
     }
 }

@@ -29,6 +29,24 @@ fn off_m(found: &FoundContact, disc: &Disc) -> f64 {
     (found.x_m - disc.x_m).hypot(found.y_m - disc.y_m)
 }
 
+/// A third of the electrodes' distance, firm: one contact, of its radius, and nothing is left of the readings.
+#[test]
+fn a_wide_firm_disc_is_one_contact() {
+    let mut solver = Compiled::new(&Problem::of(&detector()).unwrap()).unwrap();
+    let slab = Slab::with_resolution(&detector(), Resolution::FINE).unwrap();
+    for (x_m, y_m) in [(0.0035, -0.0033), (-0.0101, 0.015), (0.015, 0.015)] {
+        for sheets in [1.0, 10.0, 60.0] {
+            let there = disc(x_m, y_m, 0.005, sheets);
+            solver.reset();
+            let solution = solver.solve(&readings_v(&slab.impedance_ohm(&[there]).unwrap(), &detector())).unwrap();
+            let [found] = &solution.contacts[..] else { panic!("{there:?} {solution:?}") };
+            assert!(off_m(found, &there) < 2e-5, "{there:?} {found:?}");
+            assert!((found.radius_m.unwrap() / 0.005 - 1.0).abs() < 0.04, "{there:?} {found:?}");
+            assert!(solution.residual.unwrap() < 0.08, "{there:?} {solution:?}");
+        }
+    }
+}
+
 #[test]
 fn contacts_are_where_the_full_physics_has_them() {
     let mut solver = Compiled::new(&Problem::of(&detector()).unwrap()).unwrap();
