@@ -149,7 +149,7 @@ impl<T: Real> Loaded<T> {
     /// Finds how the current crowds, and what moment a slope drives.
     fn crowd(&mut self, head: &Head, spread_m: T, n: usize) {
         let (ohm, own_ohm) = (self.ohm, self.sample.value[n]);
-        let disc = Disc::of(head, spread_m, own_ohm, ohm);
+        let disc = Disc::of(head, self.share, spread_m, own_ohm, ohm);
         (self.radius_m, self.rest_ohm, self.even_ohm) = (disc.radius_m, disc.rest_ohm, head.even_ohm(disc.radius_m));
         (self.moment_s_m2, self.quadrupole_s_m4) = (disc.couple_s_m2, disc.quadrupole_s_m4);
         let spread_m2 = spread_m * spread_m;
@@ -159,14 +159,28 @@ impl<T: Real> Loaded<T> {
             let half = T::of(0.5) / step;
             [half * (other.couple_s_m2 - disc.couple_s_m2), half * (other.quadrupole_s_m4 - disc.quadrupole_s_m4)]
         };
-        let by_ln_ohm = half_by(Disc::of(head, spread_m, own_ohm, ohm * (T::ONE + T::of(STEP))), T::of(STEP));
-        let by_own = half_by(Disc::of(head, spread_m, own_ohm - T::of(STEP) * ohm, ohm), -T::of(STEP) * ohm);
-        let by_ln_radius = half_by(Disc::of(head, spread_m * (T::ONE + T::of(STEP)), own_ohm, ohm), T::of(STEP));
-        let [x, y] = [0, 1].map(|d| T::of(head.radius_m) * self.sample.slope[d][n]);
-        let wider = self.per_ln_radius * self.sample.wider[n];
-        let all = |i: usize| [by_own[i] * x, by_own[i] * y, by_ln_ohm[i], by_ln_radius[i] + by_own[i] * wider];
+        let by_ln_ohm =
+            half_by(Disc::of(head, self.share, spread_m, own_ohm, ohm * (T::ONE + T::of(STEP))), T::of(STEP));
+        let by_own =
+            half_by(Disc::of(head, self.share, spread_m, own_ohm - T::of(STEP) * ohm, ohm), -T::of(STEP) * ohm);
+        let by_ln_radius =
+            half_by(Disc::of(head, self.share, spread_m * (T::ONE + T::of(STEP)), own_ohm, ohm), T::of(STEP));
+        let by_share = match self.is_cut() {
+            true => half_by(Disc::of(head, self.share - T::of(STEP), spread_m, own_ohm, ohm), -T::of(STEP)),
+            false => [T::ZERO; 2],
+        };
+        let along = |values: [T; 2], i: usize| by_own[i] * values[0] + by_share[i] * values[1];
+        let place =
+            |d: usize, i: usize| T::of(head.radius_m) * along([0, 1].map(|which| self.sample.slope[d][n + which]), i);
+        let wider = |i: usize| self.per_ln_radius * along([0, 1].map(|which| self.sample.wider[n + which]), i);
+        let all = |i: usize| [place(0, i), place(1, i), by_ln_ohm[i], by_ln_radius[i] + wider(i)];
         self.moment_by_own = T::of(2.0) * by_own[0];
         (self.half_moment_by, self.half_quadrupole_by) = (all(0), all(1));
+    }
+
+    /// Whether a wall cuts it, and leaves so much that its share changes with its place.
+    fn is_cut(&self) -> bool {
+        self.share > T::of(LEAST_SHARE) && self.share < T::ONE
     }
 
     /// What electrodes and the contact's own field make of the bends at it, by the currents of an electrode. Of the own field's bend a mirror makes a quarter.
@@ -203,9 +217,8 @@ impl<T: Real> Loaded<T> {
     /// Variance of the conductance's logarithm, from the covariance of the contact's parameters with places in so many metres.
     pub fn conductance_variance(&self, table: &Table<'_>, unit_m: T, covariance: impl Fn(usize, usize) -> T) -> T {
         let n = table.electrodes();
-        let is_cut = self.share > T::of(LEAST_SHARE) && self.share < T::ONE;
         let by_place = |d: usize| {
-            let of_share = if is_cut { self.sample.slope[d][n + 1] / self.share } else { T::ZERO };
+            let of_share = if self.is_cut() { self.sample.slope[d][n + 1] / self.share } else { T::ZERO };
             unit_m * (self.sample.slope[d][n] / self.rest_ohm - of_share)
         };
         let by_radius_ohm = self.per_ln_radius * self.sample.wider[n] - self.even_ohm;

@@ -50,26 +50,27 @@ pub(crate) struct Disc<T> {
 }
 
 impl<T: Real> Disc<T> {
-    /// Of a disc whose current spreads so far, with an own field but for that on a deep layer, and a resistance with that of the crowded current.
-    pub fn of(head: &Head, spread_m: T, field_ohm: T, ohm: T) -> Self {
+    /// Of a disc such a share of which is on the detector, whose current spreads so far, with an own field but for that on a deep layer, and a resistance with that of the crowded current.
+    pub fn of(head: &Head, share: T, spread_m: T, field_ohm: T, ohm: T) -> Self {
         let least_ohm = T::ONE / (T::of(FIRMEST_SHEETS) * T::of(head.sheet_s));
         let (mut crowded, mut radius_m, mut rest_ohm) = (T::of(0.5), spread_m, least_ohm);
         for _ in 0..CROWDING_STEPS {
             radius_m = spread_m / (T::ONE + T::of(CROWDED_WIDER) * crowded).sqrt();
             let even_ohm = head.even_ohm(radius_m);
-            rest_ohm = (ohm - field_ohm - even_ohm * (T::ONE - T::of(CROWDED_LESS) * crowded)).max(least_ohm);
-            let share = even_ohm / (even_ohm + rest_ohm);
-            crowded = share * share * share;
+            rest_ohm = (ohm - field_ohm - even_ohm * (T::ONE - T::of(CROWDED_LESS) * crowded / share)).max(least_ohm);
+            let of_layer = even_ohm / (even_ohm + share * rest_ohm);
+            crowded = of_layer * of_layer * of_layer;
         }
         let deep = T::ONE / (T::of(head.top_s_per_m) * radius_m);
         let thin = T::ONE / (T::of(core::f64::consts::PI) * T::of(head.sheet_s));
         let perfect = |of_deep: f32, of_thin: f32| {
             let (deep, thin) = (T::of(of_deep) * deep, T::of(of_thin) * thin);
-            (deep * deep + thin * thin).sqrt()
+            // Of a disc that a wall cuts there is the other part in the mirror.
+            (deep * deep + thin * thin).sqrt() / share
         };
         let with_light = |light_ohm: T, perfect_ohm: T, even_more: f32| {
-            let share = perfect_ohm / (perfect_ohm + light_ohm);
-            let crowded = share * share;
+            let of_layer = perfect_ohm / (perfect_ohm + light_ohm);
+            let crowded = of_layer * of_layer;
             (light_ohm + perfect_ohm * (T::ONE + T::of(even_more) * (T::ONE - crowded)), crowded)
         };
         let square_m2 = radius_m * radius_m;
