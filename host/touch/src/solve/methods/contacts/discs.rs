@@ -113,6 +113,7 @@ impl DiscFitter<'_> {
 
     fn descend(&self, mut fit: DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
         let mut damping = Damping::new(SCHEDULE);
+        let mut gained = f64::INFINITY;
         for done in 0..=effort.steps {
             let equations = NormalEquations { matrix: fit.normal.clone(), gradient: self.gradient(&fit, target) };
             let possible = equations.step(0.0).map(|step| equations.gradient.dot(&step));
@@ -123,7 +124,8 @@ impl DiscFitter<'_> {
                 break;
             }
             if done == effort.steps {
-                fit.settled = possible.is_some_and(|possible| possible < SETTLED);
+                // Where a contact is at a bound, what would be possible beyond it is not.
+                fit.settled = possible.is_some_and(|possible| possible.min(gained) < SETTLED);
                 break;
             }
             let Some((next, expected)) = self.step(&fit, target, &equations, &mut damping) else {
@@ -135,7 +137,7 @@ impl DiscFitter<'_> {
                 fit.settled = true;
                 break;
             };
-            let gained = fit.objective() - next.objective();
+            gained = fit.objective() - next.objective();
             fit = next;
             if gained < TRUE * expected && fit.contacts != fit.slopes.at {
                 fit = self.anew(fit.contacts, fit.still, target)?;
