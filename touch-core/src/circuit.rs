@@ -183,7 +183,7 @@ impl<T: Real> Loaded<T> {
         self.share > T::of(LEAST_SHARE) && self.share < T::ONE
     }
 
-    /// What electrodes and the contact's own field make of the bends at it, by the currents of an electrode. Of the own field's bend a mirror makes a quarter.
+    /// Half of the bend along x less that along y, and that along both, of what is picked of all fields at the contact.
     fn bends(&self, values: impl Fn(&[T]) -> T) -> [T; 2] {
         let [xx, xy, yy] = [0, 1, 2].map(|which| values(&self.sample.turning[which]));
         [T::of(0.5) * (xx - yy), xy]
@@ -359,18 +359,21 @@ impl<T: Real, const K: usize> Circuit<T, K> {
             }
             self.take_widened(table, k);
             let n = table.electrodes();
-            for e in 0..n {
-                let others = (0..self.count).filter(|l| *l != k);
-                let [by_others, across] = others.fold([T::ZERO; 2], |sums, l| {
-                    [0, 1].map(|d| sums[d] + self.bends_ohm_per_m2[k][l][d] * self.loaded[l].currents[e])
-                });
-                let one = &mut self.loaded[k];
-                let quarter = T::of(0.25) * one.currents[e];
-                let [even, both] = one.bends(|values| values[e] - quarter * values[n]);
-                (one.bending_ohm_per_m2[0][e], one.bending_ohm_per_m2[1][e]) = (even - by_others, both - across);
-            }
+            (0..n).for_each(|e| self.find_bends(n, k, e));
             (0..n).for_each(|e| self.loaded[k].drive(table.head(), n, e));
         }
+    }
+
+    /// Finds what drives the quadrupoles at an electrode.
+    fn find_bends(&mut self, n: usize, k: usize, e: usize) {
+        // Of the bend of the contact's own field that of a mirror's is a quarter.
+        let quarter = T::of(0.25) * self.loaded[k].currents[e];
+        let mut bends = self.loaded[k].bends(|values| values[e] - quarter * values[n]);
+        for l in (0..self.count).filter(|l| *l != k) {
+            let of_other = self.bends_ohm_per_m2[k][l];
+            bends.iter_mut().zip(of_other).for_each(|(sum, bend)| *sum -= bend * self.loaded[l].currents[e]);
+        }
+        (0..2).for_each(|which| self.loaded[k].bending_ohm_per_m2[which][e] = bends[which]);
     }
 
     /// Takes what other contacts' currents change of the field at a contact with its radius from what electrodes do.
