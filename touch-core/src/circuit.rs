@@ -439,7 +439,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         }
         for one in &self.loaded[..self.count] {
             let by_walls: T = (0..n).map(|e| one.walls_ohm[e] * fields_ohm[e]).sum();
-            let ohm = detector.by_ways_ohm(at_m, one.spot.at_m).0 + by_walls + one.walls_ohm[n];
+            let ohm = detector.value_by_ways_ohm(at_m, one.spot.at_m) + by_walls + one.walls_ohm[n];
             (0..n).for_each(|e| all_ohm[e] -= ohm * one.currents[e]);
         }
     }

@@ -362,6 +362,12 @@ impl<'a, T: Real> Detector<'a, T> {
             .map_or(T::ONE, |(unknown, moved)| moved.gains[e] + moved.bows_v[e] * unknown.bow(e, volts)[1])
     }
 
+    /// The value alone (ohm) of [that part](Self::by_ways_ohm) of the field between two places: what a look at one more contact needs.
+    pub fn value_by_ways_ohm(&self, to_m: [T; 2], from_m: [T; 2]) -> T {
+        let far_m = |[x_m, y_m]: [T; 2]| (x_m * x_m + y_m * y_m).sqrt().max(T::of(1e-9));
+        ways_m(to_m, from_m, self.table.walls_m()).map(|way_m| self.by_distance_ohm(far_m(way_m)).0).sum()
+    }
+
     /// The part of the field between two places that goes by the ways between them: its value (ohm), its derivatives by each of both (ohm/m), and the bends there (ohm/m2):
     /// half of that along x less that along y, and that along both.
     pub fn by_ways_ohm(&self, to_m: [T; 2], from_m: [T; 2]) -> (T, [[T; 2]; 2], [[T; 2]; 2]) {
