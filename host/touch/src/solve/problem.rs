@@ -185,7 +185,7 @@ impl Problem {
     }
 
     fn made_fields(&self, cores: usize) -> Option<&CompiledFields> {
-        let is_whole = self.nuisance.seen_of.is_none() && self.made_already().is_some();
+        let is_whole = self.nuisance.seen_of.is_none() && self.nuisance.made.get().is_some();
         let made = || is_whole.then(|| CompiledFields::of(self.modelled(), cores).ok()).flatten();
         self.nuisance.fields.get_or_init(made).as_ref()
     }

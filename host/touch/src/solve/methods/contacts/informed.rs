@@ -60,9 +60,6 @@ impl ContactFinder {
         if let Some((from, keys)) = from.and_then(|from| Some((from, from.keys.as_ref()?))) {
             return Some(self.staying(from, keys, target).unwrap_or_else(|| from.clone()));
         }
-        if self.problem.nuisance().is_none() {
-            return self.search_exact(from, target, better);
-        }
         let found = self.search_unknown(from, target, better);
         let (ControlFlow::Break(found) | ControlFlow::Continue(found)) = found.map_break(Some);
         Some(found?.hypothesis)
@@ -126,10 +123,14 @@ impl ContactFinder {
 
     /// What a table tells, by what the readings may be off by together near the detector that it makes likely.
     fn informed_of(&self, found: FoundAlone, target: &Target) -> Option<Informed> {
-        let nuisance = self.problem.nuisance().filter(|_| !found.contacts.is_empty())?;
-        let steps = found.steps[..nuisance.directions()].to_vec();
-        let near = Linearised { detector: nuisance.similar(&steps).ok()?, steps };
-        let about = About { near: Some(Arc::new(near)), ..About::default() };
+        if found.contacts.is_empty() {
+            return None;
+        }
+        let near = self.problem.nuisance().map(|nuisance| {
+            let steps = found.steps[..nuisance.directions()].to_vec();
+            Some(Arc::new(Linearised { detector: nuisance.similar(&steps).ok()?, steps }))
+        });
+        let about = About { near: near.flatten(), ..About::default() };
         let target = self.informed(target, &found.contacts, &about)?;
         let fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
         let certainty = found.certainty.map(|(share, alternative)| Certainty { share, alternative });
@@ -148,7 +149,7 @@ impl ContactFinder {
             if by_count[without] <= by_count[before] {
                 break;
             }
-            let certainty = Certainty::of(without, &by_count, false);
+            let certainty = Certainty::of(without, &by_count, found.target.error().is_none());
             found.hypothesis = ContactHypothesis { certainty, ..ContactHypothesis::of(fewer, &found.target) };
         }
         found
@@ -164,7 +165,7 @@ impl ContactFinder {
             false => {
                 let mut by_count = vec![f64::NEG_INFINITY; followed.count().max(alone.count()) + 1];
                 (by_count[followed.count()], by_count[alone.count()]) = (old, new);
-                Certainty::of(best.count(), &by_count, false)
+                Certainty::of(best.count(), &by_count, best.target.error().is_none())
             }
         };
         Some(best)
@@ -312,6 +313,9 @@ impl ContactFinder {
     /// The target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
     /// if the detector is known exactly, or contacts make no sense.
     pub(super) fn informed(&self, target: &Target, contacts: &[Contact], about: &About) -> Option<Target> {
+        if self.problem.nuisance().is_none() {
+            return Some(target.clone());
+        }
         Some(self.informed_with_patterns(target, contacts, about)?.0)
     }
 
