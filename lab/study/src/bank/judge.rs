@@ -8,7 +8,8 @@ use tactomo_physics::scene::{Contact, Touch};
 use tactomo_touch::metrics::Pair;
 use tactomo_touch::solve::{FoundContact, Solution};
 
-/// What was found further off stands for an invisible contact that nothing else stands for, if it is within so many of its bounds.
+/// What was found further off than what is wrong stands for a contact that nothing else stands for, if it is within so many of its bounds: the readings of a light contact
+/// hold how strong it is, and not where.
 const BOUNDS: f64 = 3.0;
 /// A contact is visible if the bound on the logarithm of its conductance, for a known radius, is below this.
 const VISIBLE: f64 = 0.2;
@@ -93,21 +94,22 @@ impl Judged {
         let judge::Judged { found, truth, near, is_kind_right } =
             judge::Judged::of(wrong_m(detector), touches, solution);
         let bound_of = |index: usize| bounds.and_then(|bounds| bounds.get(index)).copied();
-        let is_place_of = |found: &FoundContact, index: usize| {
-            let distance_m = (found.x_m - truth[index].x_m).hypot(found.y_m - truth[index].y_m);
-            bound_of(index).is_some_and(|bound| bound.conductance >= VISIBLE && distance_m < BOUNDS * bound.position_m)
-        };
+        let mut pairs = near.pairs;
         let (mut missed, mut invented) = (near.missed, near.invented);
-        invented.retain(|contact| match missed.iter().position(|index| is_place_of(&found[*contact], *index)) {
-            Some(at) => {
-                missed.remove(at);
-                false
-            }
-            None => true,
+        invented.retain(|found_index| {
+            let distance_m = |index: usize| {
+                (found[*found_index].x_m - truth[index].x_m).hypot(found[*found_index].y_m - truth[index].y_m)
+            };
+            let is_there =
+                |index: &usize| bound_of(*index).is_some_and(|bound| distance_m(*index) < BOUNDS * bound.position_m);
+            let Some(at) = missed.iter().position(is_there) else { return true };
+            let index = missed.remove(at);
+            pairs.push(Pair { truth: index, found: *found_index, distance_m: distance_m(index) });
+            false
         });
         let of = |(index, contact): (usize, &Contact)| {
             let bound = bound_of(index);
-            let pair = near.pairs.iter().find(|pair| pair.truth == index);
+            let pair = pairs.iter().find(|pair| pair.truth == index);
             TrueContact {
                 contact: *contact,
                 scaled_radius_m: contact.radius_m / scale(detector),
@@ -239,16 +241,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_far_off_is_invented_and_what_is_invisible_is_not() {
+    fn what_is_too_far_off_is_invented_and_what_readings_do_not_place_is_not() {
         let truth = [there(0.0, 0.0), there(20.0, 0.0)];
         let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 2.2), seen(24.0, 0.0), seen(-20.0, 0.0)]);
         assert_eq!((answer.faults(), &answer.invented[..]), (1, &[2][..]));
         let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 2.3), seen(24.0, 0.0)]);
         assert_eq!((answer.faults(), &answer.invented[..], answer.is_count_right()), (2, &[0][..], true));
-        let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 0.1), seen(25.9, 0.0)]);
-        assert_eq!((answer.faults(), answer.truth[1].found), (0, None), "within three of its bounds");
-        let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 0.1), seen(26.1, 0.0)]);
-        assert_eq!(answer.faults(), 1);
+        for bound in [FAINT, Bound { position_m: 2e-3, ..CLEAR }] {
+            let answer = judged(&truth, &[CLEAR, bound], vec![seen(0.0, 0.1), seen(25.9, 0.0)]);
+            let found = answer.truth[1].found.unwrap();
+            assert!(answer.faults() == 0 && (found.error_m - 5.9e-3).abs() < 1e-9, "within three of its bounds");
+            let answer = judged(&truth, &[CLEAR, bound], vec![seen(0.0, 0.1), seen(26.1, 0.0)]);
+            assert_eq!((answer.faults(), answer.truth[1].found), (1 + usize::from(answer.truth[1].is_visible), None));
+        }
     }
 
     #[test]
