@@ -201,11 +201,6 @@ impl<T: Real, const K: usize, const D: usize> Fit<T, K, D> {
         radius_deviation: T::ZERO,
         is_alone: false,
     };
-
-    /// Whether it was made on a detector that is as its table says.
-    pub fn is_on_known(&self) -> bool {
-        self.less_said == T::ONE
-    }
 }
 
 /// How a fit goes on.

@@ -256,9 +256,9 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             return true;
         }
         let Some(left) = on.left(&self.scene) else { return false };
-        (self.on.left, self.on.prior) = (left, prior(&self.scene, self.radius_deviation));
         let rms = (left / on.task.readings()).sqrt();
         let tau = if rms > T::of(NOISE) { rms } else { T::ONE };
+        (self.on.left, self.on.prior) = (left, prior(&self.scene, self.radius_deviation_in(tau)));
         self.on.is_held &= tau == self.on.tau;
         self.on.tau = tau;
         true
@@ -278,7 +278,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         }
         let kept = self.on.kept;
         held.set_state(&kept, &at.steps);
-        let radius_deviation = self.radius_deviation;
+        let radius_deviation = self.radius_deviation_in(self.on.tau);
         let mut look = |scene: &Scene<T, K, D>, normal: &mut Normal<T, K>, held: &mut Held<'_, T>| {
             if !circuit.solve(&detector, scene.spots()) {
                 return false;
@@ -324,12 +324,20 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         Some(at)
     }
 
+    /// Standard deviation of the logarithms of radii where so much is taken for noise: if all that is known of them were held as firmly as that of the detector, contacts that
+    /// are too narrow would leave more than others could explain; if it were held as loosely as by noise itself, the first contacts would become as wide as those together that
+    /// are still missing. Of 300 random scenes on a detector that is known 76 % are right with the former, 87 with the latter, 89 with this; of 180 on detectors as built 55, 59, 64.
+    fn radius_deviation_in(&self, tau: T) -> T {
+        self.radius_deviation * tau.sqrt()
+    }
+
     /// Goes as far on the way to a scene as the readings agree to: which share of it.
     fn go_towards(&mut self, to: &Scene<T, K, D>, on: &mut On<'_, '_, T, K>) -> T {
         for share in [T::ONE, T::of(SHORTER)] {
             let there = self.scene.towards(to, share);
             if let Some(left) = on.left(&there) {
-                let new = OnUnknown { left, prior: prior(&there, self.radius_deviation), ..self.on };
+                let prior = prior(&there, self.radius_deviation_in(self.on.tau));
+                let new = OnUnknown { left, prior, ..self.on };
                 if new.objective() < self.on.objective() {
                     (self.scene, self.on) = (there, new);
                     return share;
@@ -346,6 +354,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let is_less = next < T::of(WORTH) * self.on.tau;
         if is_less {
             self.on.tau = next;
+            self.on.prior = prior(&self.scene, self.radius_deviation_in(next));
             self.on.is_held = false;
         }
         is_less
@@ -372,7 +381,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         self.ended = Fit {
             scene: self.scene,
             cost: self.on.left + steps,
-            evidence: volume - self.on.left - self.on.prior,
+            evidence: volume - self.on.left - prior(&self.scene, self.radius_deviation),
             information: self.normal.information(&known(table, circuit)),
             if_known: self.normal.if_known,
             less_said: self.normal.less_said(),

@@ -93,6 +93,8 @@ pub(crate) struct Search<T, const K: usize, const D: usize> {
     /// The contact that is looked for anew, and how many were.
     contact: u8,
     anew: u8,
+    /// Whether the detector's fields are known.
+    is_known: bool,
     /// Lowest [score] of explanations with one, two and up to `K` contacts, of those that were tried and fitted with any radii.
     by_count: [Option<T>; K],
 }
@@ -112,6 +114,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         more_before: false,
         contact: 0,
         anew: 0,
+        is_known: true,
         by_count: [None; K],
     };
 
@@ -121,8 +124,10 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         followed: Option<Fit<T, K, D>>,
         alone: Option<Candidates<T>>,
         readings: T,
+        is_known: bool,
     ) -> Wants<T, K, D> {
         (self.best, self.kept, self.tried, self.by_count) = (None, None, None, [None; K]);
+        self.is_known = is_known;
         self.from = Way::Followed;
         match (followed, alone) {
             (Some(fit), _) => self.grow(fit),
@@ -141,9 +146,9 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         better(self.kept, self.best).or(self.tried).or(at)
     }
 
-    /// How sure the count of what was found is, against other counts that were tried, on a detector that is known or not.
-    pub fn certainty(&self, found: &Fit<T, K, D>, is_known: bool) -> Certainty<T> {
-        Certainty::of(found.scene.count, score(found), &self.by_count, is_known)
+    /// How sure the count of what was found is, against other counts that were tried.
+    pub fn certainty(&self, found: &Fit<T, K, D>) -> Certainty<T> {
+        Certainty::of(found.scene.count, score(found), &self.by_count, self.is_known)
     }
 
     fn note(&mut self, found: &Fit<T, K, D>) {

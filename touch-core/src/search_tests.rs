@@ -59,49 +59,49 @@ fn run(
 fn a_search_grows_exchanges_and_reduces() {
     // Nothing there.
     let mut search = Search::NONE;
-    let wants = search.begin(None, Some(starts(&[59.0])), 240.0);
+    let wants = search.begin(None, Some(starts(&[59.0])), 240.0, true);
     assert!(matches!(wants, Wants::Nothing(None)));
     // Two contacts, each worth it: one leaves so much that it need not be found exactly, two are tried with usual radii, then fitted with any.
     let costs = [0.0, 5000.0, 230.0, 229.0];
     let by_count =
         |scene: &Scene, _| Some(fit(scene.count, costs[scene.count], 2000.0)).filter(|fit| fit.scene.count > 0);
     let gains = |scene: &Scene| if scene.count < 2 { 4000.0 } else { 5.0 };
-    let wants = search.begin(None, None, 240.0);
+    let wants = search.begin(None, None, 240.0, true);
     let (asked, found) = run(&mut search, wants, by_count, gains);
     assert_eq!(found.unwrap().scene.count, 2);
     let [usual, any] = [USUAL_RADIUS, ANY_RADIUS];
     assert_eq!(asked, [(1, usual), (2, usual), (2, any)]);
     assert!(!search.more);
     // What was followed and fits is taken on; what left room for more is not.
-    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0);
+    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0, true);
     let (asked, _) = run(&mut search, wants, by_count, gains);
     assert_eq!(asked, [(2, any)]);
     search.more = true;
-    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0);
+    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0, true);
     assert!(run(&mut search, wants, by_count, gains).0.len() > 1);
     // Contacts that leave too much: each is looked for anew, beside the one that stays.
     let bad = |scene: &Scene, _| {
         Some(fit(scene.count, 9000.0 / (scene.count as f32 + 1.0), 2000.0)).filter(|fit| fit.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0);
+    let wants = search.begin(None, None, 240.0, true);
     let (asked, found) = run(&mut search, wants, bad, gains);
     assert_eq!(found.unwrap().scene.count, 2);
     let anew = asked.windows(2).filter(|two| two[0] == (2, any) && two[1] == (1, usual)).count();
     assert_eq!(anew, 2, "{asked:?}");
     // One of which little is known goes where the other does as well: it is looked for anew, or where the detector is not known only left out.
-    for (less_said, deviation) in [(1.0, usual), (1.5, any)] {
-        let of = |count: usize, cost: f32| Fit { less_said, ..fit(count, cost, 40.0) };
+    for (is_known, deviation) in [(true, usual), (false, any)] {
+        let of = |count: usize, cost: f32| fit(count, cost, 40.0);
         let alike = |scene: &Scene, _| {
             Some(of(scene.count, if scene.count == 1 { 241.0 } else { 230.0 })).filter(|fit| fit.scene.count > 0)
         };
         let mut search = Search::NONE;
-        let wants = search.begin(Some(of(2, 230.0)), None, 240.0);
+        let wants = search.begin(Some(of(2, 230.0)), None, 240.0, true);
         let (asked, found) = run(&mut search, wants, alike, |_| 0.0);
         assert_eq!((found.unwrap().scene.count, &asked[1..3]), (1, &[(1, deviation), (1, any)][..]));
     }
     // One that readings do not speak for goes, and with the last of them all.
-    let wants = search.begin(Some(fit(1, 230.0, 20.0)), None, 240.0);
+    let wants = search.begin(Some(fit(1, 230.0, 20.0)), None, 240.0, true);
     assert!(
         run(
             &mut search,
@@ -114,7 +114,7 @@ fn a_search_grows_exchanges_and_reduces() {
     );
     // Where one more beside three would explain much, that is said.
     let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0);
+    let wants = search.begin(None, None, 240.0, true);
     let (_, found) = run(
         &mut search,
         wants,
@@ -134,7 +134,7 @@ fn what_more_contacts_do_not_mend_is_kept() {
             _ => spoilt.map(|cost| fit(scene.count, cost, 2000.0)),
         };
         let mut search = Search::NONE;
-        let wants = search.begin(None, None, 240.0);
+        let wants = search.begin(None, None, 240.0, true);
         let (asked, found) = run(&mut search, wants, costs, |_| 4000.0);
         assert!(asked.contains(&(2, ANY_RADIUS)), "{spoilt:?} {asked:?}");
         assert_eq!(found.unwrap().scene.count, 2, "{spoilt:?} {asked:?}");
@@ -145,7 +145,7 @@ fn what_more_contacts_do_not_mend_is_kept() {
         Some(of).filter(|of| of.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0);
+    let wants = search.begin(None, None, 240.0, true);
     let (asked, _) = run(&mut search, wants, needless, |_| 4000.0);
     let numbers: Vec<_> = asked.iter().map(|(count, _)| *count).collect();
     assert_eq!(numbers[..3], [1, 2, 2], "the first is left out, where there is a second: {asked:?}");
@@ -161,7 +161,7 @@ fn a_contact_alone_that_went_astray_is_looked_for_anew() {
         Some(fit(scene.count, cost, 2000.0)).filter(|of| of.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(Some(fit(1, 900.0, 2000.0)), None, 240.0);
+    let wants = search.begin(Some(fit(1, 900.0, 2000.0)), None, 240.0, true);
     let (_, found) = run(&mut search, wants, astray, |scene| if scene.count == 0 { 4000.0 } else { 0.0 });
     assert_eq!(found.map(|found| (found.scene.count, found.cost)), Some((1, 230.0)));
 }
@@ -187,9 +187,9 @@ fn how_sure_a_number_is_goes_with_the_evidence() {
         Some(Fit { radius_deviation, ..of }).filter(|of| of.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0);
+    let wants = search.begin(None, None, 240.0, true);
     let (_, found) = run(&mut search, wants, by_count, |scene| if scene.count < 2 { 4000.0 } else { 20.0 });
-    let told = search.certainty(&found.unwrap(), true);
+    let told = search.certainty(&found.unwrap());
     // Three leave 20 less and cost 21 more.
     let odds = (-0.5f32).exp();
     assert!((told.share - 1.0 / (1.0 + odds)).abs() < 1e-3 && told.other.unwrap().0 == 3, "{told:?}");

@@ -44,6 +44,11 @@ impl<T: Real> Task<'_, T> {
     pub fn readings(&self) -> T {
         T::of(self.errors.count as u32)
     }
+
+    /// Whether the detector's fields are as its table says.
+    pub fn is_known(&self) -> bool {
+        self.unknown.is_none_or(|unknown| unknown.tables == 0)
+    }
 }
 
 /// What a piece of work needs besides.
@@ -386,7 +391,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         let may_search = !self.is_patient || self.was_lost && self.may_search();
         if is_lost && may_search {
             (self.stage, self.pieces) = (Stage::Searched, 0);
-            let wants = self.search.begin(found, alone, readings);
+            let wants = self.search.begin(found, alone, readings, task.is_known());
             return self.prepare(wants, task);
         }
         if is_lost && !self.was_lost {
@@ -408,7 +413,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     fn found(&mut self, found: Option<Fit<T, K, D>>, task: Task<'_, T>) -> Option<Answer<T, K>> {
         self.search.more &= found.is_some();
         self.searched = found.map_or(T::ZERO, |fit| fit.cost);
-        self.certainty = found.map(|fit| self.search.certainty(&fit, task.unknown.is_none()));
+        self.certainty = found.map(|fit| self.search.certainty(&fit));
         let fits = self.pieces < Self::MOST_PIECES && found.is_none_or(|fit| !is_misfit(&fit, task.readings()));
         self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
         self.wait = if fits { 0 } else { self.patience };

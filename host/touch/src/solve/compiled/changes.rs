@@ -67,6 +67,11 @@ impl Changes {
         let mut all = Self { own_pads_ohm, ..Self::default() };
         let directions = detector.unknowns().directions;
         if directions.is_empty() {
+            // What is left is the model's error of each pad.
+            for e in 0..detector.electrodes.len() {
+                all.changes.push(Change::Pad(e, PAD_ERROR as f32));
+                all.directions.push(Direction { table: None, square: None, changes: e..e + 1 });
+            }
             return Ok(all);
         }
         let coarse = modelled.model.coarse()?.unwrap_or_else(|| Arc::clone(modelled.model));

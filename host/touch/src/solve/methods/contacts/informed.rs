@@ -1,6 +1,6 @@
-//! The search on a detector that is not known exactly.
+//! The search, on detectors that are known exactly and others.
 //!
-//! What readings may be off by together depends on the scene, and a little on the detector that it makes likely
+//! What readings of the others may be off by together depends on the scene, and a little on the detector that it makes likely
 //! ([`ApproximationError`]). So a fit and its target are brought to agree, for a single contact first: a second one would stand for
 //! what the detector differs by. Explanations with targets of their own are compared by the evidence with the determinant of
 //! their readings' error.
@@ -60,14 +60,14 @@ impl ContactFinder {
         if let Some((from, keys)) = from.and_then(|from| Some((from, from.keys.as_ref()?))) {
             return Some(self.staying(from, keys, target).unwrap_or_else(|| from.clone()));
         }
-        let found = self.search_unknown(from, target, better);
+        let found = self.search_anew(from, target, better);
         let (ControlFlow::Break(found) | ControlFlow::Continue(found)) = found.map_break(Some);
         Some(found?.hypothesis)
     }
 
     /// What explains a frame: what explained the one before, or what the compiled detector finds by itself. What leaves more than noise does is gone on from, contact by
     /// contact. What ended the search breaks.
-    fn search_unknown(
+    fn search_anew(
         &self,
         from: Option<&ContactHypothesis>,
         target: &Target,
@@ -84,9 +84,9 @@ impl ContactFinder {
         ControlFlow::Continue(Some(best))
     }
 
-    /// What explains a frame, where the detector has no table: from what explained the one before, if that leads there, else from nothing, contact by contact. A few
-    /// that are found roughly are given first.
-    fn search_by_discs(
+    /// What explains a frame, where the detector has no table: from what explained the one before, if that leads there, else from nothing, contact by contact. On a
+    /// detector that is not known exactly, a few that are found roughly are given first.
+    pub(super) fn search_by_discs(
         &self,
         followed: Option<Informed>,
         target: &Target,
@@ -95,7 +95,8 @@ impl ContactFinder {
         let followed = match followed {
             Some(followed) => Some(self.grown(followed, better)?),
             None => {
-                self.begun_roughly(target).map_or(ControlFlow::Continue(()), |begun| told(&begun, better))?;
+                let begun = self.problem.nuisance().and_then(|_| self.begun_roughly(target));
+                begun.map_or(ControlFlow::Continue(()), |begun| told(&begun, better))?;
                 None
             }
         };
@@ -172,7 +173,7 @@ impl ContactFinder {
     }
 
     /// Contacts that stand for something else, with what the readings of that may be off by together, beginning with the detector that `error`
-    /// is about; `None` of a detector that is known exactly.
+    /// is about; `None` if they make no sense.
     pub(crate) fn standing(
         &self,
         contacts: Vec<Contact>,
@@ -189,7 +190,9 @@ impl ContactFinder {
     /// else.
     fn begun_roughly(&self, target: &Target) -> Option<Informed> {
         let rough = Target::provisional(&target.readings(), target.frames, &self.errors);
-        let begun = self.search_exact(None, &rough, &mut |_| ControlFlow::Continue(()))?;
+        let one = self.one(&rough)?;
+        let pairs = self.pairs(&one, &rough);
+        let begun = self.grow(one, pairs, &rough, &mut |_| ControlFlow::Continue(()));
         if begun.fit.contacts.len() > policy::suspicious_contacts() {
             return None;
         }
@@ -202,6 +205,9 @@ impl ContactFinder {
         let target = self.informed(target, &self.begun(target)?, &About::default())?;
         let one = self.one(&target)?;
         let settled = self.settled(Informed { hypothesis: ContactHypothesis::of(one, &target), target });
+        if settled.target.error().is_none() {
+            return Some(settled);
+        }
         // Places that seemed worse with another detector may now be better.
         let again = self.one(&settled.target)?;
         let again =
@@ -310,8 +316,8 @@ impl ContactFinder {
         self.evidence(&found.hypothesis.fit) - 0.5 * found.target.ln_determinant()
     }
 
-    /// The target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
-    /// if the detector is known exactly, or contacts make no sense.
+    /// The target with what the readings of such contacts may be off by together, linear near a detector or else the described one, and as it is where that is not known or
+    /// nothing; `None` if contacts make no sense.
     pub(super) fn informed(&self, target: &Target, contacts: &[Contact], about: &About) -> Option<Target> {
         if self.problem.nuisance().is_none() {
             return Some(target.clone());

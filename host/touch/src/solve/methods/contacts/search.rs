@@ -52,26 +52,6 @@ impl ContactFinder {
         self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= policy::first_gain())
     }
 
-    /// What explains a frame of a detector that is as described, from what explains it so far if that leads there, else from nothing. Each better
-    /// explanation on the way goes to `better`; to the end, as it takes little.
-    pub(super) fn search_exact(
-        &self,
-        from: Option<&ContactHypothesis>,
-        target: &Target,
-        better: &mut Better<'_>,
-    ) -> Option<ContactHypothesis> {
-        let grown = from.and_then(|from| self.disc_fitter().go_on(&from.fit, target, COLD));
-        let grown = grown.map(|fit| self.grow(fit, Vec::new(), target, better));
-        if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.fit, target)) {
-            return Some(grown.clone());
-        }
-        let anew = self.one(target).map(|one| {
-            let starts = self.pairs(&one, target);
-            self.grow(one, starts, target, better)
-        });
-        [grown, anew].into_iter().flatten().max_by(|a, b| self.evidence(&a.fit).total_cmp(&self.evidence(&b.fit)))
-    }
-
     /// Starts of two contacts at once, where one leaves a little more than it should, or is wide: then another one far from it may be hidden in how wide it is.
     pub(super) fn pairs(&self, one: &DiscFit, target: &Target) -> Vec<Vec<Contact>> {
         let may_be_two = self.is_doubtful(one, target) || self.may_be_two(one).is_some();
