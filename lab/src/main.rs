@@ -22,9 +22,6 @@ use clap::CommandFactory;
 static ALLOCATOR: heap::Counting = heap::Counting;
 
 fn main() -> ExitCode {
-    if let Some(v) = std::env::var("TT").ok().and_then(|v| v.parse().ok()) {
-        tactomo_touch::solve::TT.store(v, std::sync::atomic::Ordering::Relaxed);
-    }
     let cli: commands::Cli = tactomo_cli::options::read(commands::Cli::command());
     tactomo_cli::run(|| commands::run(cli))
 }

@@ -66,12 +66,6 @@ mod vector;
 mod walls;
 pub mod ways;
 
-/// HACK
-pub static TT: core::sync::atomic::AtomicU32 = core::sync::atomic::AtomicU32::new(0);
-/// HACK
-pub fn tt(bit: u32) -> bool {
-    TT.load(core::sync::atomic::Ordering::Relaxed) >> bit & 1 == 1
-}
 pub use self::answer::{Answer, Certainty, Contact, Flags};
 pub use self::contents::Contents;
 pub use self::fit::Work;

@@ -96,7 +96,7 @@ fn a_search_grows_exchanges_and_reduces() {
             Some(of(scene.count, if scene.count == 1 { 241.0 } else { 230.0 })).filter(|fit| fit.scene.count > 0)
         };
         let mut search = Search::NONE;
-        let wants = search.begin(Some(of(2, 230.0)), None, 240.0, true);
+        let wants = search.begin(Some(of(2, 230.0)), None, 240.0, is_known);
         let (asked, found) = run(&mut search, wants, alike, |_| 0.0);
         assert_eq!((found.unwrap().scene.count, &asked[1..3]), (1, &[(1, deviation), (1, any)][..]));
     }

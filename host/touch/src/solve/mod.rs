@@ -70,5 +70,3 @@ pub use crate::learned::kernel::{
     Description, Kernel, Press, Presses, PressesError, Strength, TeachError, check_newtons,
 };
 pub use crate::learned::network::{Network, NetworkError};
-/// HACK
-pub use tactomo_touch_core::TT;

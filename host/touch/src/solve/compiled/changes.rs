@@ -67,11 +67,6 @@ impl Changes {
         let mut all = Self { own_pads_ohm, ..Self::default() };
         let directions = detector.unknowns().directions;
         if directions.is_empty() {
-            // What is left is the model's error of each pad.
-            for e in 0..detector.electrodes.len() {
-                all.changes.push(Change::Pad(e, PAD_ERROR as f32));
-                all.directions.push(Direction { table: None, square: None, changes: e..e + 1 });
-            }
             return Ok(all);
         }
         let coarse = modelled.model.coarse()?.unwrap_or_else(|| Arc::clone(modelled.model));
@@ -89,11 +84,12 @@ impl Changes {
         Ok(all)
     }
 
-    /// With what is not known of the converters that measure the detector; `None` if nothing is.
-    pub fn measured(&self, detector: &Detector) -> Option<Self> {
+    /// With what is not known of the models of its pads and of the converters that measure the detector.
+    pub fn measured(&self, detector: &Detector) -> Self {
         let mut all = self.clone();
+        all.add_pads(detector);
         all.add_converters(detector);
-        Some(all).filter(|all| !all.directions.is_empty())
+        all
     }
 
     /// How they are given to the core.
@@ -174,7 +170,18 @@ impl Changes {
         }
     }
 
-    /// What is not known of converters, and of pads' models.
+    /// The model's error of each pad that does not differ by itself.
+    fn add_pads(&mut self, detector: &Detector) {
+        let directions = detector.unknowns().directions;
+        let differs = |e: usize| directions.iter().flatten().any(|(parameter, _)| *parameter == Parameter::Pad(e));
+        for e in (0..detector.electrodes.len()).filter(|e| !differs(*e)) {
+            let start = self.changes.len();
+            self.changes.push(Change::Pad(e, PAD_ERROR as f32));
+            self.directions.push(Direction { table: None, square: None, changes: start..start + 1 });
+        }
+    }
+
+    /// What is not known of converters.
     fn add_converters(&mut self, detector: &Detector) {
         let range = |pad: &tactomo_physics::detector::Electrode| detector.converters.get(pad.converter);
         self.ranges_v = detector

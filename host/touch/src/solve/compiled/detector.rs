@@ -26,8 +26,7 @@ pub(crate) struct CompiledDetector {
     pub bytes: Vec<u8>,
     pub electrodes: usize,
     pub drive_v: f64,
-    /// None of a detector that is known exactly.
-    pub changes: Option<Changes>,
+    pub changes: Changes,
     /// Numbers and floats that work on it takes room for.
     pub room: [usize; 2],
 }
@@ -53,17 +52,14 @@ impl CompiledFields {
         let bytes = self.fitted.table_apart(modelled);
         let table = Table::read(&bytes).map_err(|error| refused(with_causes(&error)))?;
         let changes = self.changes.measured(detector);
-        let mut room = [0; 2];
-        if let Some(changes) = &changes {
-            let unknown = changes.unknown();
-            let count = unknown.directions.len();
-            if count > MOST_DIRECTIONS {
-                let what = format!("it may differ in {count} directions; `core` takes {MOST_DIRECTIONS} at most");
-                return Err(refused(what));
-            }
-            let [numbers, floats] = [Room::<f64>::numbers, Room::<f64>::floats];
-            room = [numbers(&table, &unknown, MOST_CONTACTS), floats(&table, &unknown, MOST_CONTACTS)];
+        let unknown = changes.unknown();
+        let count = unknown.directions.len();
+        if count > MOST_DIRECTIONS {
+            let what = format!("it may differ in {count} directions; `core` takes {MOST_DIRECTIONS} at most");
+            return Err(refused(what));
         }
+        let [numbers, floats] = [Room::<f64>::numbers, Room::<f64>::floats];
+        let room = [numbers(&table, &unknown, MOST_CONTACTS), floats(&table, &unknown, MOST_CONTACTS)];
         Ok(CompiledDetector { electrodes: detector.electrodes.len(), drive_v: detector.drive_v, bytes, changes, room })
     }
 }

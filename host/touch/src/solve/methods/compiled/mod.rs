@@ -81,13 +81,8 @@ impl Compiled {
         let table = Table::read_again(bytes).map_err(|_| wrong.clone())?;
         let frame = Frame::new(&volts, &says);
         let frame = noise_v.map_or(frame, |noise_v| frame.with_noise(noise_v));
-        let answer = match changes {
-            Some(changes) => {
-                let mut room = Room { numbers: &mut self.numbers, floats: &mut self.floats };
-                self.core.solve_unknown(&table, &changes.unknown(), &mut room, &frame)
-            }
-            None => self.core.solve(&table, &frame),
-        };
+        let mut room = Room { numbers: &mut self.numbers, floats: &mut self.floats };
+        let answer = self.core.solve_unknown(&table, &changes.unknown(), &mut room, &frame);
         answer.map_err(|error| match error {
             FrameError::NotFinite { g, e } => SolveError::NotFinite { g, e },
             _ => wrong,

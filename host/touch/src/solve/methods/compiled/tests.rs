@@ -42,7 +42,7 @@ fn a_wide_firm_disc_is_one_contact() {
             let [found] = &solution.contacts[..] else { panic!("{there:?} {solution:?}") };
             assert!(off_m(found, &there) < 2e-5, "{there:?} {found:?}");
             assert!((found.radius_m.unwrap() / 0.005 - 1.0).abs() < 0.04, "{there:?} {found:?}");
-            assert!(solution.residual.unwrap() < 0.08, "{there:?} {solution:?}");
+            assert!(solution.residual.unwrap() < 0.09, "{there:?} {solution:?}");
         }
     }
 }
