@@ -1,4 +1,4 @@
-//! Where one more contact would explain most of what others leave of a frame, on a detector that is not known.
+//! Where one more contact would explain most of what others leave of a frame, where something is not known of a detector or its board.
 //!
 //! As [`beside`](crate::beside), with what is not known of the detector in the covariance: the residual is whitened, and freed of what the detector's steps explain; the square
 //! of what a contact at a place would change is less what steps and contacts could do as well. That is worked out for those places only that would explain most without it.

@@ -176,8 +176,8 @@ impl Problem {
         self.nuisance.made.get_or_init(made).as_ref()
     }
 
-    /// The detector as measured, compiled with what is not known of it; `None` if it is exact or curved, has too many electrodes or is seen through some of them, and
-    /// as long as that is [made beside](Self::make_nuisance_beside). Else the first call compiles it, which takes half a second of a core with 16 electrodes.
+    /// The detector as measured, compiled with what is not known of it; `None` if it is curved, has too many electrodes or is seen through some of them, and as long as
+    /// that is [made beside](Self::make_nuisance_beside). Else the first call compiles it, which takes half a second of a core with 16 electrodes.
     pub(crate) fn compiled(&self) -> Option<CompiledDetector> {
         let made = || self.nuisance.fields.get().and_then(Option::as_ref);
         let fields = if self.is_made_beside() { made() } else { self.made_fields(threads::cores()) };
@@ -185,7 +185,7 @@ impl Problem {
     }
 
     fn made_fields(&self, cores: usize) -> Option<&CompiledFields> {
-        let is_whole = self.nuisance.seen_of.is_none() && self.nuisance.made.get().is_some();
+        let is_whole = self.nuisance.seen_of.is_none();
         let made = || is_whole.then(|| CompiledFields::of(self.modelled(), cores).ok()).flatten();
         self.nuisance.fields.get_or_init(made).as_ref()
     }

@@ -127,11 +127,14 @@ impl ContactFinder {
         if found.contacts.is_empty() {
             return None;
         }
-        let near = self.problem.nuisance().map(|nuisance| {
-            let steps = found.steps[..nuisance.directions()].to_vec();
-            Some(Arc::new(Linearised { detector: nuisance.similar(&steps).ok()?, steps }))
-        });
-        let about = About { near: near.flatten(), ..About::default() };
+        let near = match self.problem.nuisance() {
+            Some(nuisance) => {
+                let steps = found.steps[..nuisance.directions()].to_vec();
+                Some(Arc::new(Linearised { detector: nuisance.similar(&steps).ok()?, steps }))
+            }
+            None => None,
+        };
+        let about = About { near, ..About::default() };
         let target = self.informed(target, &found.contacts, &about)?;
         let fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
         let certainty = found.certainty.map(|(share, alternative)| Certainty { share, alternative });
