@@ -78,7 +78,10 @@ impl ContactFinder {
         let Some(best) = self.likelier(followed, alone) else { return ControlFlow::Continue(None) };
         let best = self.without_needless(best);
         told(&best, better)?;
-        if self.is_misfit(&best.hypothesis.fit, &best.target) {
+        let fit = &best.hypothesis.fit;
+        // In how wide one is another one may be hidden, far from it.
+        let may_be_two = best.target.error().is_none() && best.count() == 1 && self.may_be_two(fit).is_some();
+        if may_be_two || self.is_misfit(fit, &best.target) {
             return self.grown(best, better).map_continue(Some);
         }
         ControlFlow::Continue(Some(best))
