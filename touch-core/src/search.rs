@@ -70,6 +70,15 @@ enum Way {
     Rest,
 }
 
+/// What a search is told before.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Terms {
+    /// Whether the detector's fields are known.
+    pub is_known: bool,
+    /// Most contacts that are looked for.
+    pub most: usize,
+}
+
 /// A search, of which one piece after the other is done.
 #[derive(Clone, Debug)]
 pub(crate) struct Search<T, const K: usize, const D: usize> {
@@ -93,8 +102,7 @@ pub(crate) struct Search<T, const K: usize, const D: usize> {
     /// The contact that is looked for anew, and how many were.
     contact: u8,
     anew: u8,
-    /// Whether the detector's fields are known.
-    is_known: bool,
+    terms: Terms,
     /// Lowest [score] of explanations with one, two and up to `K` contacts, of those that were tried and fitted with any radii.
     by_count: [Option<T>; K],
 }
@@ -114,7 +122,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         more_before: false,
         contact: 0,
         anew: 0,
-        is_known: true,
+        terms: Terms { is_known: true, most: K },
         by_count: [None; K],
     };
 
@@ -124,10 +132,10 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         followed: Option<Fit<T, K, D>>,
         alone: Option<Candidates<T>>,
         readings: T,
-        is_known: bool,
+        terms: Terms,
     ) -> Wants<T, K, D> {
         (self.best, self.kept, self.tried, self.by_count) = (None, None, None, [None; K]);
-        self.is_known = is_known;
+        self.terms = terms;
         self.from = Way::Followed;
         match (followed, alone) {
             (Some(fit), _) => self.grow(fit),
@@ -148,7 +156,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
 
     /// How sure the count of what was found is, against other counts that were tried.
     pub fn certainty(&self, found: &Fit<T, K, D>) -> Certainty<T> {
-        Certainty::of(found.scene.count, score(found), &self.by_count, self.is_known)
+        Certainty::of(found.scene.count, score(found), &self.by_count, self.terms.is_known)
     }
 
     fn note(&mut self, found: &Fit<T, K, D>) {
@@ -167,7 +175,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         match self.awaits {
             Awaits::Grown => {
                 self.best = better(self.best, found.or(Some(self.at)));
-                if self.at.scene.count == K {
+                if self.at.scene.count >= self.terms.most {
                     return self.grown(readings);
                 }
                 self.awaits = Awaits::More;
@@ -254,7 +262,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
             Awaits::Another => {
                 // Halves may gain much by a contact's shape.
                 self.more = self.starts.iter().any(|start| start.half_of.is_none() && start.gain > T::of(FIRST_GAIN));
-                let is_full = self.best.is_some_and(|best| best.scene.count == K);
+                let is_full = self.best.is_some_and(|best| best.scene.count >= self.terms.most);
                 if gain > T::of(TRIED_GAIN) && !is_full {
                     self.start_above(T::of(TRIED_GAIN), true, readings)
                 } else {
@@ -283,7 +291,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
 
     /// Whether so much is left of the readings that more contacts are there for sure, and fewer need not be found exactly.
     fn leaves_most(&self, tried: &Fit<T, K, D>, readings: T) -> bool {
-        !self.completes && tried.scene.count < K && tried.cost > T::of(MOST_OF) * limit(readings)
+        !self.completes && tried.scene.count < self.terms.most && tried.cost > T::of(MOST_OF) * limit(readings)
     }
 
     /// Whether one more contact has made what is left of the readings less.

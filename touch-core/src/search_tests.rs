@@ -4,11 +4,13 @@ use std::vec::Vec;
 
 use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
 use crate::scan::{Candidate, Candidates, no_candidates};
+use crate::search::Terms;
 use crate::tests::{Fit, Scene, spot};
 
 type Search = crate::search::Search<f32, 3, 0>;
 type Wants = crate::search::Wants<f32, 3, 0>;
 
+const KNOWN: Terms = Terms { is_known: true, most: 3 };
 /// What a contact costs in these fits (squared deviations).
 const PRICE: f32 = 21.0;
 
@@ -59,32 +61,32 @@ fn run(
 fn a_search_grows_exchanges_and_reduces() {
     // Nothing there.
     let mut search = Search::NONE;
-    let wants = search.begin(None, Some(starts(&[59.0])), 240.0, true);
+    let wants = search.begin(None, Some(starts(&[59.0])), 240.0, KNOWN);
     assert!(matches!(wants, Wants::Nothing(None)));
     // Two contacts, each worth it: one leaves so much that it need not be found exactly, two are tried with usual radii, then fitted with any.
     let costs = [0.0, 5000.0, 230.0, 229.0];
     let by_count =
         |scene: &Scene, _| Some(fit(scene.count, costs[scene.count], 2000.0)).filter(|fit| fit.scene.count > 0);
     let gains = |scene: &Scene| if scene.count < 2 { 4000.0 } else { 5.0 };
-    let wants = search.begin(None, None, 240.0, true);
+    let wants = search.begin(None, None, 240.0, KNOWN);
     let (asked, found) = run(&mut search, wants, by_count, gains);
     assert_eq!(found.unwrap().scene.count, 2);
     let [usual, any] = [USUAL_RADIUS, ANY_RADIUS];
     assert_eq!(asked, [(1, usual), (2, usual), (2, any)]);
     assert!(!search.more);
     // What was followed and fits is taken on; what left room for more is not.
-    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0, true);
+    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0, KNOWN);
     let (asked, _) = run(&mut search, wants, by_count, gains);
     assert_eq!(asked, [(2, any)]);
     search.more = true;
-    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0, true);
+    let wants = search.begin(Some(fit(2, 400.0, 2000.0)), None, 240.0, KNOWN);
     assert!(run(&mut search, wants, by_count, gains).0.len() > 1);
     // Contacts that leave too much: each is looked for anew, beside the one that stays.
     let bad = |scene: &Scene, _| {
         Some(fit(scene.count, 9000.0 / (scene.count as f32 + 1.0), 2000.0)).filter(|fit| fit.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0, true);
+    let wants = search.begin(None, None, 240.0, KNOWN);
     let (asked, found) = run(&mut search, wants, bad, gains);
     assert_eq!(found.unwrap().scene.count, 2);
     let anew = asked.windows(2).filter(|two| two[0] == (2, any) && two[1] == (1, usual)).count();
@@ -96,12 +98,12 @@ fn a_search_grows_exchanges_and_reduces() {
             Some(of(scene.count, if scene.count == 1 { 241.0 } else { 230.0 })).filter(|fit| fit.scene.count > 0)
         };
         let mut search = Search::NONE;
-        let wants = search.begin(Some(of(2, 230.0)), None, 240.0, is_known);
+        let wants = search.begin(Some(of(2, 230.0)), None, 240.0, Terms { is_known, ..KNOWN });
         let (asked, found) = run(&mut search, wants, alike, |_| 0.0);
         assert_eq!((found.unwrap().scene.count, &asked[1..3]), (1, &[(1, deviation), (1, any)][..]));
     }
     // One that readings do not speak for goes, and with the last of them all.
-    let wants = search.begin(Some(fit(1, 230.0, 20.0)), None, 240.0, true);
+    let wants = search.begin(Some(fit(1, 230.0, 20.0)), None, 240.0, KNOWN);
     assert!(
         run(
             &mut search,
@@ -114,7 +116,7 @@ fn a_search_grows_exchanges_and_reduces() {
     );
     // Where one more beside three would explain much, that is said.
     let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0, true);
+    let wants = search.begin(None, None, 240.0, KNOWN);
     let (_, found) = run(
         &mut search,
         wants,
@@ -134,7 +136,7 @@ fn what_more_contacts_do_not_mend_is_kept() {
             _ => spoilt.map(|cost| fit(scene.count, cost, 2000.0)),
         };
         let mut search = Search::NONE;
-        let wants = search.begin(None, None, 240.0, true);
+        let wants = search.begin(None, None, 240.0, KNOWN);
         let (asked, found) = run(&mut search, wants, costs, |_| 4000.0);
         assert!(asked.contains(&(2, ANY_RADIUS)), "{spoilt:?} {asked:?}");
         assert_eq!(found.unwrap().scene.count, 2, "{spoilt:?} {asked:?}");
@@ -145,7 +147,7 @@ fn what_more_contacts_do_not_mend_is_kept() {
         Some(of).filter(|of| of.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0, true);
+    let wants = search.begin(None, None, 240.0, KNOWN);
     let (asked, _) = run(&mut search, wants, needless, |_| 4000.0);
     let numbers: Vec<_> = asked.iter().map(|(count, _)| *count).collect();
     assert_eq!(numbers[..3], [1, 2, 2], "the first is left out, where there is a second: {asked:?}");
@@ -161,7 +163,7 @@ fn a_contact_alone_that_went_astray_is_looked_for_anew() {
         Some(fit(scene.count, cost, 2000.0)).filter(|of| of.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(Some(fit(1, 900.0, 2000.0)), None, 240.0, true);
+    let wants = search.begin(Some(fit(1, 900.0, 2000.0)), None, 240.0, KNOWN);
     let (_, found) = run(&mut search, wants, astray, |scene| if scene.count == 0 { 4000.0 } else { 0.0 });
     assert_eq!(found.map(|found| (found.scene.count, found.cost)), Some((1, 230.0)));
 }
@@ -187,7 +189,7 @@ fn how_sure_a_number_is_goes_with_the_evidence() {
         Some(Fit { radius_deviation, ..of }).filter(|of| of.scene.count > 0)
     };
     let mut search = Search::NONE;
-    let wants = search.begin(None, None, 240.0, true);
+    let wants = search.begin(None, None, 240.0, KNOWN);
     let (_, found) = run(&mut search, wants, by_count, |scene| if scene.count < 2 { 4000.0 } else { 20.0 });
     let told = search.certainty(&found.unwrap());
     // Three leave 20 less and cost 21 more.

@@ -16,7 +16,7 @@ use crate::held::Room;
 use crate::normal::ANY_RADIUS;
 use crate::real::Real;
 use crate::scan::{first, no_candidates};
-use crate::search::{FIRST_GAIN, Search, Wants};
+use crate::search::{FIRST_GAIN, Search, Terms, Wants};
 use crate::table::Table;
 use crate::unknown::Unknown;
 
@@ -109,6 +109,8 @@ pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS, const D: usize = 0> 
     was_lost: bool,
     /// Whether one is waited for that is not explained either.
     is_patient: bool,
+    /// Most contacts that are looked for.
+    most: usize,
     /// What was followed with a contact that the readings hardly speak for, and whether that stays.
     doubted: Option<Fit<T, K, D>>,
     stays: bool,
@@ -159,6 +161,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             wait: 0,
             was_lost: true,
             is_patient,
+            most: K,
             doubted: None,
             stays: false,
         }
@@ -166,7 +169,12 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
 
     /// Forgets the frames before.
     pub fn reset(&mut self) {
-        *self = Self::blank(self.is_patient);
+        *self = Self { most: self.most, ..Self::blank(self.is_patient) };
+    }
+
+    /// Looks for so many contacts at most, of the `K` that there may be.
+    pub fn limit(&mut self, most: usize) {
+        self.most = most.clamp(1, K);
     }
 
     /// The contacts of a frame.
@@ -391,7 +399,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         let may_search = !self.is_patient || self.was_lost && self.may_search();
         if is_lost && may_search {
             (self.stage, self.pieces) = (Stage::Searched, 0);
-            let wants = self.search.begin(found, alone, readings, task.is_known());
+            let wants = self.search.begin(found, alone, readings, Terms { is_known: task.is_known(), most: self.most });
             return self.prepare(wants, task);
         }
         if is_lost && !self.was_lost {

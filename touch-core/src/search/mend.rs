@@ -30,9 +30,9 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     pub(super) fn exchange(&mut self, readings: T) -> Wants<T, K, D> {
         let Some(kept) = self.kept else { return self.nothing_found() };
         let count = kept.scene.count;
-        let is_much = count > 1 && self.is_known && kept.cost > readings - freedom(&kept);
+        let is_much = count > 1 && self.terms.is_known && kept.cost > readings - freedom(&kept);
         let is_any = is_much || self.is_to_be_mended(&kept, readings);
-        let is_astray = |contact: usize| is_any || self.is_known && is_unsure(&kept, contact, SURE);
+        let is_astray = |contact: usize| is_any || self.terms.is_known && is_unsure(&kept, contact, SURE);
         while usize::from(self.anew) < count {
             let contact = usize::from(self.contact) % count;
             (self.contact, self.anew) = (contact as u8, self.anew + 1);
@@ -59,7 +59,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     }
 
     fn is_to_be_mended(&self, fit: &Fit<T, K, D>, readings: T) -> bool {
-        let is_beyond = self.more && fit.scene.count == K;
+        let is_beyond = self.more && fit.scene.count >= self.terms.most;
         !is_beyond && (self.more || is_misfit(fit, readings))
     }
 

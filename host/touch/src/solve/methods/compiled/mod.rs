@@ -56,12 +56,13 @@ impl Compiled {
         Self { core: Box::default(), numbers: vec![0.0; numbers], floats: vec![0.0; floats], detector }
     }
 
-    /// What explains the mean of some frames, whose noise has such a standard deviation (V), whatever was before.
+    /// What explains the mean of some frames, whose noise has such a standard deviation (V), by so many contacts at most, whatever was before.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
-    pub(crate) fn alone(&mut self, readings: &Readings, noise_v: f64) -> Result<FoundAlone, SolveError> {
+    pub(crate) fn alone(&mut self, readings: &Readings, noise_v: f64, most: usize) -> Result<FoundAlone, SolveError> {
         self.core.reset();
+        self.core.limit(most);
         let answer = self.answer(readings, Some(noise_v))?;
         let disc = |of: &Contact<f64>| Disc::flat(of.x_m, of.y_m, of.radius_m, of.conductance_s);
         Ok(FoundAlone {

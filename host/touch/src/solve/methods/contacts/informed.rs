@@ -120,7 +120,7 @@ impl ContactFinder {
             if compiled.is_none() {
                 *compiled = self.problem.compiled().map(Compiled::on);
             }
-            compiled.as_mut()?.alone(&target.readings(), target.noise_v).ok()?
+            compiled.as_mut()?.alone(&target.readings(), target.noise_v, self.settings.most).ok()?
         };
         Some(self.informed_of(found, target))
     }

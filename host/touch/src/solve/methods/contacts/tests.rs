@@ -201,6 +201,19 @@ fn as_long_as_nothing_is_known_of_its_errors_a_detector_as_built_invents_little_
     assert!(invented[1] <= 10 && 2 * invented[1] < invented[0] && far <= 6, "{invented:?} {far}");
 }
 
+/// As a calibration by single presses does: of two contacts it has one, and says that this explains nothing.
+#[test]
+fn no_more_contacts_are_told_than_are_looked_for() {
+    let described = Detector::preset(Detector::DEFAULT).unwrap();
+    let there = [contact(0.012, 0.004, 0.5), contact(-0.014, -0.01, 1.0)];
+    for detector in [described.clone(), described.taken_as_exact()] {
+        let problem = Problem::of(&detector).unwrap();
+        let settings = ContactSettings { most: 1, ..ContactSettings::of(&problem) };
+        let solution = Contacts::new(&problem, settings).unwrap().solve(&frame(&there, &mut Noise::new(5))).unwrap();
+        assert!(solution.contacts.len() == 1 && solution.flags.misfit, "{solution:?}");
+    }
+}
+
 #[test]
 fn a_calibration_is_asked_for_where_places_are_off_and_seldom_where_they_are_right() {
     let described = Detector::preset(Detector::DEFAULT).unwrap();
