@@ -113,7 +113,7 @@ impl ContactFinder {
         ControlFlow::Continue(self.more_likely(followed, anew))
     }
 
-    /// What the compiled detector finds in a frame by itself, if anything; `None` if there is no table, or not yet.
+    /// What the compiled detector finds in a frame by itself, if anything; `None` if there is no table, or not yet, or what is found makes no sense to the model itself.
     fn found_by_table(&self, target: &Target) -> Option<Option<Informed>> {
         let found = {
             let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
@@ -122,14 +122,14 @@ impl ContactFinder {
             }
             compiled.as_mut()?.alone(&target.readings(), target.noise_v, self.settings.most).ok()?
         };
-        Some(self.informed_of(found, target))
+        if found.contacts.is_empty() {
+            return Some(None);
+        }
+        self.informed_of(found, target).map(Some)
     }
 
     /// What a table tells, by what the readings may be off by together near the detector that it makes likely.
     fn informed_of(&self, found: FoundAlone, target: &Target) -> Option<Informed> {
-        if found.contacts.is_empty() {
-            return None;
-        }
         let near = match self.problem.nuisance() {
             Some(nuisance) => {
                 let steps = found.steps[..nuisance.directions()].to_vec();
