@@ -313,7 +313,7 @@ fn a_ring_that_has_moved_on_a_detector_as_built_is_found_from_where_it_was() {
         moved.flags
     );
     // Contacts that were searched from nothing are fewer.
-    assert_eq!(moved.contacts.len(), 8, "they stand in a row along where it was");
+    assert_eq!(moved.contacts.len(), 6, "they stand in a row along where it was");
 }
 
 #[test]

@@ -73,7 +73,15 @@ impl ContactFinder {
         target: &Target,
         better: &mut Better<'_>,
     ) -> ControlFlow<Informed, Option<Informed>> {
-        let followed = from.and_then(|from| self.caught_up(from, target));
+        let mut followed = from.and_then(|from| self.caught_up(from, target));
+        if let Some(known) = followed.take_if(|followed| followed.target.error().is_none()) {
+            // There, what is followed seldom leads astray, and bumps that come and go one after the other are told from what was there.
+            let grown = self.grown(known, better)?;
+            if !self.is_misfit(&grown.hypothesis.fit, &grown.target) {
+                return ControlFlow::Continue(Some(grown));
+            }
+            followed = Some(grown);
+        }
         let Some(alone) = self.found_by_table(target) else { return self.search_by_discs(followed, target, better) };
         let Some(best) = self.likelier(followed, alone) else { return ControlFlow::Continue(None) };
         let best = self.without_needless(best);

@@ -49,7 +49,6 @@ use self::window::KeyFrame;
 use crate::solve::answer::{Alternative, Calibrated, Flags, FoundContact, Solution, SolveError, Uncertainty, check};
 use crate::solve::before::adaptive_mean;
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
-use crate::solve::compiled::MOST_CONTACTS;
 use crate::solve::fit::approximation::{About, ApproximationError};
 use crate::solve::fit::balance::balance;
 use crate::solve::fit::evidence::{Evidence, misfit_limit};
@@ -93,13 +92,7 @@ impl ContactSettings {
     pub fn of(problem: &Problem) -> Self {
         let model_error = model_error(&*problem.model);
         // Five fingers and a palm.
-        Self {
-            most: MOST_CONTACTS,
-            radius_m: problem.usual_radius_m(),
-            radius_deviation: 0.7,
-            model_error,
-            pad_error: PAD_ERROR,
-        }
+        Self { most: 6, radius_m: problem.usual_radius_m(), radius_deviation: 0.7, model_error, pad_error: PAD_ERROR }
     }
 }
 
