@@ -208,8 +208,12 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
                 let ohm = T::of(log) * moved.switch_ohm;
                 volts.iter_mut().enumerate().for_each(|(index, volts)| *volts += ohm * per_ohm(index));
             }
-            Change::Pad(g, log) => {
-                let ohm = T::of(log) * moved.own_pads_ohm[g];
+            Change::Pad(g, log) | Change::Crowding(g, log) => {
+                let of_one = match change {
+                    Change::Pad(..) => moved.own_pads_ohm[g],
+                    _ => moved.crowding[g] * T::of(self.detector.table.pads_ohm(g, g)),
+                };
+                let ohm = T::of(log) * of_one;
                 for (e, volts) in volts.iter_mut().skip(g * n).take(n).enumerate() {
                     // The grounded pad itself is nearer to ground by what its own resistance takes.
                     let own = -self.there_v[g * n + g] / self.circuit.loads_ohm[g];
@@ -232,7 +236,7 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
             Change::Gain(e, log) => of_channel(e, &|there_v| T::of(log) * moved.gains[e] * there_v),
             Change::Offset(e, offset_v) => of_channel(e, &|_| T::of(offset_v)),
             Change::Bow(e, height_v) => of_channel(e, &|there_v| T::of(height_v) * self.unknown.bow(e, there_v)[0]),
-            Change::Switch(..) | Change::Pad(..) => {}
+            Change::Switch(..) | Change::Pad(..) | Change::Crowding(..) => {}
         }
     }
 }

@@ -24,6 +24,8 @@ pub enum Change {
     Offset(usize, f32),
     /// Of the logarithm of a pad's own impedance.
     Pad(usize, f32),
+    /// Of the logarithm of an electrode's field at itself, which is most of a pad's impedance: of how its current crowds there.
+    Crowding(usize, f32),
     /// Of the logarithm of the switch's resistance.
     Switch(f32),
     /// Of the height of a channel's bow (V): a parabola between the ends of its converter's range.
@@ -267,6 +269,7 @@ impl Layout {
                     Change::Gain(e, log) => gains[e] += step * T::of(log),
                     Change::Offset(e, volts) => offsets[e] += step * T::of(volts),
                     Change::Pad(e, log) => last[e] += step * T::of(log),
+                    Change::Crowding(e, log) => pads[pairs(e) + e] += step * T::of(log) * T::of(table.pads_ohm(e, e)),
                     Change::Bow(e, height_v) => bows[e] += step * T::of(height_v),
                     Change::Switch(log) => last[n] += step * T::of(log),
                 }

@@ -57,6 +57,7 @@ impl MadeUp {
             Change::Bow(1, 0.01),
             Change::Gain(8, 0.005),
             Change::Pad(8, 0.5),
+            Change::Crowding(8, 0.1),
         ];
         let alone = |number: usize| Direction { table: None, square: None, changes: number..number + 1 };
         let mut directions = std::vec![
@@ -64,7 +65,7 @@ impl MadeUp {
             Direction { table: Some(2), square: None, changes: 0..0 },
         ];
         directions.extend((0..5).map(alone));
-        directions.push(Direction { table: None, square: None, changes: 5..7 });
+        directions.push(Direction { table: None, square: None, changes: 5..8 });
         Self {
             directions,
             changes,

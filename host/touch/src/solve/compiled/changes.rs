@@ -127,8 +127,11 @@ impl Changes {
                 } else if *parameter == Parameter::DrivingSheet {
                     of_fields.extend(sheet.map(|table| (*step, table)));
                 } else {
-                    add_changes(*parameter, *step, detector, &mut self.changes);
+                    add_changes(*parameter, *step, detector.electrodes.len(), &mut self.changes);
                 }
+            }
+            if let Some(e) = lone_pad(steps) {
+                self.changes.push(Change::Crowding(e, PAD_ERROR as f32));
             }
             let is_alone = matches!(of_fields[..], [(share, _)] if share == 1.0);
             let table = match of_fields[..] {
@@ -170,13 +173,13 @@ impl Changes {
         }
     }
 
-    /// The model's error of each pad that does not differ by itself.
+    /// The model's error of each pad that has no direction of its own, in which that is there by now.
     fn add_pads(&mut self, detector: &Detector) {
         let directions = detector.unknowns().directions;
-        let differs = |e: usize| directions.iter().flatten().any(|(parameter, _)| *parameter == Parameter::Pad(e));
-        for e in (0..detector.electrodes.len()).filter(|e| !differs(*e)) {
+        let lone: Vec<usize> = directions.iter().filter_map(|steps| lone_pad(steps)).collect();
+        for e in (0..detector.electrodes.len()).filter(|e| !lone.contains(e)) {
             let start = self.changes.len();
-            self.changes.push(Change::Pad(e, PAD_ERROR as f32));
+            self.changes.push(Change::Crowding(e, PAD_ERROR as f32));
             self.directions.push(Direction { table: None, square: None, changes: start..start + 1 });
         }
     }
@@ -205,14 +208,20 @@ impl Changes {
     }
 }
 
+/// The pad whose own impedance is all that a direction changes. What the model's impedance of a pad is off by, which is of the same pattern, is part of that direction.
+fn lone_pad(steps: &[(Parameter, f64)]) -> Option<usize> {
+    match steps {
+        [(Parameter::Pad(e), _)] => Some(*e),
+        _ => None,
+    }
+}
+
 /// Changes that need no fields.
-fn add_changes(parameter: Parameter, step: f64, detector: &Detector, changes: &mut Vec<Change>) {
-    let n = detector.electrodes.len();
+fn add_changes(parameter: Parameter, step: f64, n: usize, changes: &mut Vec<Change>) {
     match parameter {
         Parameter::Gain(e) => changes.push(Change::Gain(e, step as f32)),
         Parameter::Offset(e) => changes.push(Change::Offset(e, step as f32)),
-        // With it, the model's error of a pad.
-        Parameter::Pad(e) => changes.push(Change::Pad(e, step.abs().hypot(PAD_ERROR) as f32)),
+        Parameter::Pad(e) => changes.push(Change::Pad(e, step as f32)),
         Parameter::Pads => changes.extend((0..n).map(|e| Change::Pad(e, step as f32))),
         Parameter::OnResistance => changes.push(Change::Switch(step as f32)),
         Parameter::Conductivity => {
