@@ -19,6 +19,7 @@
 //!
 //! A current that crowds at the rim has the fields of an even one on a wider disc. What is fitted is the radius of that disc, the spread.
 
+use crate::answer::Contact;
 use crate::disc::Disc;
 use crate::fields::Sample;
 use crate::head::Head;
@@ -53,6 +54,16 @@ pub(crate) struct Spot<T> {
 impl<T: Real> Spot<T> {
     /// None.
     pub const NONE: Self = Self { at_m: [T::ZERO; 2], ln_ohm: T::ZERO, ln_radius: T::ZERO };
+
+    /// About what is fitted of a contact: as if its current were even.
+    pub fn of(contact: &Contact<T>, table: &Table<'_>) -> Self {
+        let at_m = [contact.x_m, contact.y_m];
+        let mut sample = Sample::NONE;
+        table.sample(at_m, T::ZERO, T::ZERO, &mut sample);
+        let own_ohm = sample.value[table.electrodes()] + table.head().even_ohm(contact.radius_m);
+        let ln_radius = (contact.radius_m / T::of(table.head().radius_m)).ln();
+        Self { at_m, ln_ohm: (own_ohm + T::ONE / contact.conductance_s).ln(), ln_radius }
+    }
 }
 
 /// A vector over electrodes.

@@ -6,9 +6,9 @@
 //!
 //! All that is done in pieces, each of which ends soon, so that whoever has something else to do between them can.
 
-use crate::answer::{Answer, Certainty, Flags};
+use crate::answer::{Answer, Certainty, Contact, Flags};
 use crate::beside::beside;
-use crate::circuit::Circuit;
+use crate::circuit::{Circuit, Spot};
 use crate::evidence::{freedom, is_misfit, is_nothing, limit, score, weakest};
 use crate::fit::{Bench, Fit, Fitting, Scene, Went, Work, Working};
 use crate::frame::{Errors, Frame, FrameError};
@@ -27,6 +27,8 @@ const WORSE: f32 = 1.3;
 /// Steps at most where contacts are followed, and where one that is gone is left out.
 const FOLLOWING: u8 = 4;
 const LEAVING_OUT: u8 = 20;
+/// Steps at most where contacts are given.
+const TO_THE_END: u8 = 60;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
 const PATIENCE: [u32; 2] = [1, 64];
 
@@ -236,6 +238,39 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             let means = &mut Means { room: Some(&mut *room), attend: &mut || {} };
             if let Some(answer) = self.work_on(table, frame, Some(unknown), u32::MAX, means)? {
                 return Ok(answer);
+            }
+        }
+    }
+
+    /// Twice the logarithm of the evidence for contacts that are fitted to a frame from where some are, but for what is the same for all; `None` if they make no sense. It tells
+    /// whether what a search found explains a frame less well than what is there. The frames before are forgotten.
+    ///
+    /// # Errors
+    /// [`FrameError`] if it cannot be a frame of the table's detector.
+    ///
+    /// # Panics
+    /// As [`solve_unknown`](Self::solve_unknown).
+    pub fn evidence(
+        &mut self,
+        table: &Table<'_>,
+        unknown: &Unknown<'_>,
+        room: &mut Room<'_, T>,
+        frame: &Frame<'_, T>,
+        contacts: &[Contact<T>],
+    ) -> Result<Option<T>, FrameError> {
+        frame.check(table)?;
+        self.reset();
+        let mut errors = Errors::of(frame, table);
+        errors.pads.fill(T::ZERO);
+        self.fitting.on.begin_frame(&mut errors, frame.volts.len());
+        let task = Task { table, frame, errors: &errors, unknown: Some(unknown) };
+        let scene = contacts.iter().fold(Scene::EMPTY, |scene, contact| scene.with(Spot::of(contact, table)));
+        self.fit(scene, T::of(ANY_RADIUS), TO_THE_END);
+        let mut bench = Bench { circuit: &mut self.circuit, room: Some(room) };
+        let mut work = Working { done: &mut self.work, attend: &mut || {} };
+        loop {
+            if let Went::ToEnd(found) = self.fitting.go_on(task, &mut bench, &mut work) {
+                return Ok(found.map(|fit| fit.evidence));
             }
         }
     }

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use crate::solve::answer::{FoundContact, Solution, SolveError};
 use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
 
 /// A method that reads touch from the readings of a frame.
 ///
@@ -43,6 +44,16 @@ pub trait Solver: Send + 'static {
     fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
         let _ = (rows, elapsed_s);
         self.solve(latest)
+    }
+
+    /// Twice the logarithm of the evidence for contacts that are fitted to readings from where some are, but for what is the same for all: it tells whether an answer
+    /// explains readings less well than what is there. `None` if they make no sense, or the solver has no evidence for contacts that it has not searched. The frames before are forgotten.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn evidence(&mut self, readings: &Readings, contacts: &[Contact]) -> Result<Option<f64>, SolveError> {
+        let _ = (readings, contacts);
+        Ok(None)
     }
 
     /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.

@@ -19,7 +19,7 @@ use super::machine::Machine;
 use super::stopwatch::timed;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Contact, Touch};
-use tactomo_touch::solve::{Method, Solution, Solver};
+use tactomo_touch::solve::{FoundContact, Method, Solution, Solver};
 
 pub use self::cases::{Case, Touching, detectors};
 pub use self::judge::{Judged, Match, Place, TrueContact};
@@ -94,6 +94,8 @@ pub struct Trial {
     /// The last answer against the truth.
     #[serde(flatten)]
     pub judged: Judged,
+    /// Whether the answer is wrong though what touches explains the readings better, if the solver can tell.
+    pub is_search_to_blame: Option<bool>,
     /// Time of the first frame (us).
     pub cold_us: f64,
     /// Times of the next frames (us).
@@ -190,6 +192,9 @@ impl<'a> Tried<'a> {
         let mut trials = Vec::with_capacity(self.solvers.len());
         for solver in &mut self.solvers {
             let (solutions, mut times_us) = answered(&mut **solver, &readings)?;
+            let judged = Judged::new(detector, &scene.touches, bounds.as_deref(), &solutions[self.frames - 1]);
+            let is_search_to_blame =
+                is_search_to_blame(&mut **solver, &readings[self.frames - 1], &judged, problem.usual_radius_m())?;
             let (_, mut tikhonov_us) = answered(&mut *self.tikhonov, &readings)?;
             tikhonov_us.sort_by(f64::total_cmp);
             trials.push(Trial {
@@ -198,7 +203,8 @@ impl<'a> Tried<'a> {
                 scene: scene.index,
                 kind: scene.kind,
                 detector: detector.name.clone(),
-                judged: Judged::new(detector, &scene.touches, bounds.as_deref(), &solutions[self.frames - 1]),
+                judged,
+                is_search_to_blame,
                 cold_us: times_us.remove(0),
                 next_us: times_us.split_off(1),
                 tikhonov_us: tikhonov_us[tikhonov_us.len() / 2],
@@ -206,6 +212,35 @@ impl<'a> Tried<'a> {
         }
         Ok(trials)
     }
+}
+
+/// Whether an answer is wrong though what touches, or what is visible of it, explains the readings better by the solver's own evidence. `None` if it has none for what it has not
+/// searched, or the answer is not of contacts.
+fn is_search_to_blame(
+    solver: &mut dyn Solver,
+    readings: &Readings,
+    judged: &Judged,
+    usual_radius_m: f64,
+) -> Result<Option<bool>, StudyError> {
+    if !judged.is_kind_right || judged.truth.is_empty() {
+        return Ok(None);
+    }
+    let disc = |found: &FoundContact| {
+        Contact::flat(found.x_m, found.y_m, found.radius_m.unwrap_or(usual_radius_m), found.conductance_s)
+    };
+    let found: Vec<_> = judged.found.iter().map(disc).collect();
+    let truth: Vec<_> = judged.truth.iter().map(|truth| truth.contact).collect();
+    let visible: Vec<_> = judged.visible().map(|truth| truth.contact).collect();
+    let mut evidence = |contacts: &[Contact]| {
+        let name = solver.name();
+        solver.evidence(readings, contacts).map_err(|error| StudyError::Solve { solver: name.to_owned(), error })
+    };
+    let Some(of_found) = evidence(&found)? else { return Ok(None) };
+    if judged.faults() == 0 {
+        return Ok(Some(false));
+    }
+    let of_truth = [evidence(&truth)?, evidence(&visible)?].into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
+    Ok(Some(of_truth > of_found))
 }
 
 /// What a solver answers from a cold start, and how long each frame took (us).

@@ -35,6 +35,9 @@ pub struct SceneFigures {
     pub count_right: f64,
     /// Share with all visible contacts found and none invented.
     pub all_found: f64,
+    /// Share that is wrong though what touches explains the readings better, by the evidence of the solver, if it has that: for these its search is to blame, for others that are wrong
+    /// what readings and model hold.
+    pub search: Option<f64>,
     /// Share that the solver flags as misfit.
     pub misfit: f64,
     /// Of those that are wrong, the share that is flagged as misfit or names the right number of contacts as its alternative.
@@ -146,6 +149,7 @@ impl SceneFigures {
         let share_of = |is: &dyn Fn(&Trial) -> bool| share(trials.iter().map(|trial| is(trial)));
         let wrong = trials.iter().filter(|trial| trial.judged.faults() > 0);
         let warned: Vec<bool> = wrong.map(|trial| trial.judged.is_warned()).collect();
+        let to_blame: Vec<bool> = trials.iter().filter_map(|trial| trial.is_search_to_blame).collect();
         let median = |all: &mut dyn Iterator<Item = f64>| quantiles(all, [0.5]).map(|[median]| median);
         let cold = &mut trials.iter().map(|trial| trial.cold_us / trial.tikhonov_us);
         let next = &mut trials.iter().flat_map(|trial| trial.next_us.iter().map(|us| us / trial.tikhonov_us));
@@ -155,6 +159,7 @@ impl SceneFigures {
             scenes: trials.len(),
             count_right: share_of(&|trial| trial.judged.is_count_right())?,
             all_found: share_of(&|trial| trial.judged.faults() == 0)?,
+            search: share(to_blame.into_iter()),
             misfit: share_of(&|trial| trial.judged.misfit)?,
             cold_us: Quantiles::of(trials.iter().map(|trial| trial.cold_us), 0.95)?,
             next_us: Quantiles::of(trials.iter().flat_map(|trial| trial.next_us.iter().copied()), 0.95)?,
@@ -234,6 +239,7 @@ mod tests {
             kind: None,
             detector: detector.name,
             judged,
+            is_search_to_blame: Some(off_mm.is_empty()),
             cold_us: 1e3,
             next_us: vec![10.0, 30.0, 20.0],
             tikhonov_us: 5.0,

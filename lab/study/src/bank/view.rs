@@ -35,6 +35,7 @@ pub fn view(report: &Report) -> View {
         .column("scenes", whole, of_scenes(|scenes| Some(scenes.scenes as f64)))
         .column("count", PERCENT, of_scenes(|scenes| Some(scenes.count_right)))
         .column("right", PERCENT, of_scenes(|scenes| Some(scenes.all_found)))
+        .column("search", PERCENT, of_scenes(|scenes| scenes.search))
         .column("misfit", PERCENT, of_scenes(|scenes| Some(scenes.misfit)))
         .column("warned", PERCENT, of_scenes(|scenes| scenes.warned))
         .column("cold", MILLISECONDS, of_scenes(|scenes| Some(scenes.cold_us.median)))
@@ -54,7 +55,8 @@ pub fn view(report: &Report) -> View {
         .column("ln C, 1 s", PERCENT, of(|contacts| contacts.conductance_within.map(|[one, _]| one)))
         .column("2 s", PERCENT, of(|contacts| contacts.conductance_within.map(|[_, two]| two)))
         .note(
-            "count: as many found as are there; right: all visible found and none invented, and of the kind that touches; warned: of those that are wrong, \
+            "count: as many found as are there; right: all visible found and none invented, and of the kind that touches; search: wrong though what touches explains the \
+             readings better, by the solver's own evidence; warned: of those that are wrong, \
              flagged or with the right number as alternative; cold, next: time of the first frame and of later ones, over tikhonov: in that solver's on the \
              same frames; visible: the bound on ln C is below 0.2; xy, ln C: within 1 and 2 claimed standard errors",
         )

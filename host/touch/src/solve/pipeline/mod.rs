@@ -26,6 +26,7 @@ use crate::solve::answer::{FoundContact, Solution, SolveError, check_count};
 use crate::solve::problem::Problem;
 use crate::solve::solver::{Followed, Hypothesis, Parts, Search, Solver, Tracker};
 use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
 
 /// What is done to readings before a method has them, and to its answers after. Cheap to clone.
 #[derive(Clone, Default)]
@@ -134,6 +135,11 @@ impl Solver for Staged<dyn Solver> {
             None => self.half.solve_rows(&rows, &latest, elapsed_s)?,
         };
         Ok(self.stages.after(&rows, solution))
+    }
+
+    fn evidence(&mut self, readings: &Readings, contacts: &[Contact]) -> Result<Option<f64>, SolveError> {
+        let seen = self.stages.seen(readings)?;
+        self.half.evidence(&*self.stages.before(&seen)?, contacts)
     }
 
     fn reset(&mut self) {

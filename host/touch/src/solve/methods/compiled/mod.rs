@@ -6,7 +6,7 @@
 mod tests;
 
 use tactomo_touch_core::{
-    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Room, Says as CoreSays, Solver as Core, Table,
+    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Room, Says as CoreSays, Solver as Core, Table, Unknown,
 };
 
 use crate::solve::answer::{Alternative, Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
@@ -22,10 +22,13 @@ use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::scene::Contact as Disc;
 use tactomo_physics::threads;
 
+/// The core in a computer's numbers, for a computer's contacts.
+type HostCore = Core<f64, MOST_CONTACTS, MOST_DIRECTIONS>;
+
 /// `core`: contacts by the board's own search, by a table.
 pub struct Compiled {
     detector: CompiledDetector,
-    core: Box<Core<f64, MOST_CONTACTS, MOST_DIRECTIONS>>,
+    core: Box<HostCore>,
     /// Where the core works on what is not known.
     numbers: Vec<f64>,
     floats: Vec<f32>,
@@ -73,6 +76,24 @@ impl Compiled {
     }
 
     fn answer(&mut self, readings: &Readings, noise_v: Option<f64>) -> Result<Answer<f64, MOST_CONTACTS>, SolveError> {
+        self.on_frame(readings, noise_v, |core, table, unknown, room, frame| {
+            core.solve_unknown(table, unknown, room, frame)
+        })
+    }
+
+    /// Lets the core work on a frame.
+    fn on_frame<R>(
+        &mut self,
+        readings: &Readings,
+        noise_v: Option<f64>,
+        work: impl FnOnce(
+            &mut HostCore,
+            &Table<'_>,
+            &Unknown<'_>,
+            &mut Room<'_, f64>,
+            &Frame<'_, f64>,
+        ) -> Result<R, FrameError>,
+    ) -> Result<R, SolveError> {
         let CompiledDetector { bytes, electrodes, drive_v, changes, .. } = &self.detector;
         check_count(readings, *electrodes)?;
         let volts: Vec<_> = readings.volts().iter().map(|volts| held_v(*volts, *drive_v)).collect();
@@ -83,8 +104,7 @@ impl Compiled {
         let frame = Frame::new(&volts, &says);
         let frame = noise_v.map_or(frame, |noise_v| frame.with_noise(noise_v));
         let mut room = Room { numbers: &mut self.numbers, floats: &mut self.floats };
-        let answer = self.core.solve_unknown(&table, &changes.unknown(), &mut room, &frame);
-        answer.map_err(|error| match error {
+        work(&mut self.core, &table, &changes.unknown(), &mut room, &frame).map_err(|error| match error {
             FrameError::NotFinite { g, e } => SolveError::NotFinite { g, e },
             _ => wrong,
         })
@@ -98,6 +118,13 @@ impl Solver for Compiled {
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         Ok(solution(&self.answer(readings, None)?))
+    }
+
+    fn evidence(&mut self, readings: &Readings, contacts: &[Disc]) -> Result<Option<f64>, SolveError> {
+        let contacts: Vec<_> = contacts.iter().map(core_contact).collect();
+        self.on_frame(readings, None, |core, table, unknown, room, frame| {
+            core.evidence(table, unknown, room, frame, &contacts)
+        })
     }
 
     fn reset(&mut self) {
@@ -127,6 +154,11 @@ pub fn add_newtons(table: &[u8], law: &ForceLaw, contacts: &mut [FoundContact]) 
         let apparent_s = contact.apparent_conductance_s.unwrap_or(contact.conductance_s) as f32;
         contact.set_force(law.force_n(table.constricted_conductance_s(at_m, apparent_s).into(), 0.0));
     }
+}
+
+fn core_contact(disc: &Disc) -> Contact<f64> {
+    let Disc { x_m, y_m, radius_m, conductance_s, .. } = *disc;
+    Contact { x_m, y_m, radius_m, conductance_s, ..Contact::default() }
 }
 
 fn core_says(says: Says) -> CoreSays {
