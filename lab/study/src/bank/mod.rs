@@ -94,8 +94,9 @@ pub struct Trial {
     /// The last answer against the truth.
     #[serde(flatten)]
     pub judged: Judged,
-    /// Whether the answer is wrong though what touches explains the readings better, if the solver can tell.
-    pub is_search_to_blame: Option<bool>,
+    /// By how much of the logarithm of the evidence what touches explains the readings better than an answer that is wrong (nats), by the solver's own evidence; none if it has
+    /// no evidence for what it has not searched.
+    pub behind_nats: Option<f64>,
     /// Time of the first frame (us).
     pub cold_us: f64,
     /// Times of the next frames (us).
@@ -193,8 +194,8 @@ impl<'a> Tried<'a> {
         for solver in &mut self.solvers {
             let (solutions, mut times_us) = answered(&mut **solver, &readings)?;
             let judged = Judged::new(detector, &scene.touches, bounds.as_deref(), &solutions[self.frames - 1]);
-            let is_search_to_blame =
-                is_search_to_blame(&mut **solver, &readings[self.frames - 1], &judged, problem.usual_radius_m())?;
+            let behind_nats =
+                behind_nats(&mut **solver, &readings[self.frames - 1], &judged, problem.usual_radius_m())?;
             let (_, mut tikhonov_us) = answered(&mut *self.tikhonov, &readings)?;
             tikhonov_us.sort_by(f64::total_cmp);
             trials.push(Trial {
@@ -204,7 +205,7 @@ impl<'a> Tried<'a> {
                 kind: scene.kind,
                 detector: detector.name.clone(),
                 judged,
-                is_search_to_blame,
+                behind_nats,
                 cold_us: times_us.remove(0),
                 next_us: times_us.split_off(1),
                 tikhonov_us: tikhonov_us[tikhonov_us.len() / 2],
@@ -214,14 +215,13 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// Whether an answer is wrong though what touches, or what is visible of it, explains the readings better by the solver's own evidence. `None` if it has none for what it has not
-/// searched, or the answer is not of contacts.
-fn is_search_to_blame(
+/// By how much of the logarithm of the evidence what touches, or what is visible of it, explains readings better than an answer that is wrong; 0 of one that is right.
+fn behind_nats(
     solver: &mut dyn Solver,
     readings: &Readings,
     judged: &Judged,
     usual_radius_m: f64,
-) -> Result<Option<bool>, StudyError> {
+) -> Result<Option<f64>, StudyError> {
     if !judged.is_kind_right || judged.truth.is_empty() {
         return Ok(None);
     }
@@ -237,10 +237,10 @@ fn is_search_to_blame(
     };
     let Some(of_found) = evidence(&found)? else { return Ok(None) };
     if judged.faults() == 0 {
-        return Ok(Some(false));
+        return Ok(Some(0.0));
     }
     let of_truth = [evidence(&truth)?, evidence(&visible)?].into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
-    Ok(Some(of_truth > of_found))
+    Ok(Some(0.5 * (of_truth - of_found)))
 }
 
 /// What a solver answers from a cold start, and how long each frame took (us).

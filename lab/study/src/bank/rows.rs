@@ -8,6 +8,9 @@ use crate::score::quantiles;
 /// Strongest over lightest contact from which a scene is one of contrasts.
 const CONTRAST: f64 = 100.0;
 
+/// What explains readings better than an answer does so by this at least (nats): less is between two fits that end in the same place.
+const BEHIND_NATS: f64 = 1.0;
+
 /// Classes of what is claimed: from so much on.
 const SURE: [f64; 4] = [0.95, 0.8, 0.5, 0.0];
 
@@ -35,7 +38,7 @@ pub struct SceneFigures {
     pub count_right: f64,
     /// Share with all visible contacts found and none invented.
     pub all_found: f64,
-    /// Share that is wrong though what touches explains the readings better, by the evidence of the solver, if it has that: for these its search is to blame, for others that are wrong
+    /// Share that is wrong though what touches explains the readings better by a nat and more, by the evidence of the solver, if it has that: for these its search is to blame, for others that are wrong
     /// what readings and model hold.
     pub search: Option<f64>,
     /// Share that the solver flags as misfit.
@@ -149,7 +152,7 @@ impl SceneFigures {
         let share_of = |is: &dyn Fn(&Trial) -> bool| share(trials.iter().map(|trial| is(trial)));
         let wrong = trials.iter().filter(|trial| trial.judged.faults() > 0);
         let warned: Vec<bool> = wrong.map(|trial| trial.judged.is_warned()).collect();
-        let to_blame: Vec<bool> = trials.iter().filter_map(|trial| trial.is_search_to_blame).collect();
+        let behind: Vec<bool> = trials.iter().filter_map(|trial| Some(trial.behind_nats? > BEHIND_NATS)).collect();
         let median = |all: &mut dyn Iterator<Item = f64>| quantiles(all, [0.5]).map(|[median]| median);
         let cold = &mut trials.iter().map(|trial| trial.cold_us / trial.tikhonov_us);
         let next = &mut trials.iter().flat_map(|trial| trial.next_us.iter().map(|us| us / trial.tikhonov_us));
@@ -159,7 +162,7 @@ impl SceneFigures {
             scenes: trials.len(),
             count_right: share_of(&|trial| trial.judged.is_count_right())?,
             all_found: share_of(&|trial| trial.judged.faults() == 0)?,
-            search: share(to_blame.into_iter()),
+            search: share(behind.into_iter()),
             misfit: share_of(&|trial| trial.judged.misfit)?,
             cold_us: Quantiles::of(trials.iter().map(|trial| trial.cold_us), 0.95)?,
             next_us: Quantiles::of(trials.iter().flat_map(|trial| trial.next_us.iter().copied()), 0.95)?,
@@ -239,7 +242,7 @@ mod tests {
             kind: None,
             detector: detector.name,
             judged,
-            is_search_to_blame: Some(off_mm.is_empty()),
+            behind_nats: Some(if off_mm.is_empty() { 2.0 } else { 0.0 }),
             cold_us: 1e3,
             next_us: vec![10.0, 30.0, 20.0],
             tikhonov_us: 5.0,

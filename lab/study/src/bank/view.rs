@@ -56,7 +56,7 @@ pub fn view(report: &Report) -> View {
         .column("2 s", PERCENT, of(|contacts| contacts.conductance_within.map(|[_, two]| two)))
         .note(
             "count: as many found as are there; right: all visible found and none invented, and of the kind that touches; search: wrong though what touches explains the \
-             readings better, by the solver's own evidence; warned: of those that are wrong, \
+             readings better by a nat and more, by the solver's own evidence; warned: of those that are wrong, \
              flagged or with the right number as alternative; cold, next: time of the first frame and of later ones, over tikhonov: in that solver's on the \
              same frames; visible: the bound on ln C is below 0.2; xy, ln C: within 1 and 2 claimed standard errors",
         )
@@ -85,7 +85,7 @@ pub fn view(report: &Report) -> View {
 fn worst(trial: &Trial) -> Table {
     let judged = &trial.judged;
     let title = format!(
-        "{}, {}, scene {} on {}: {} there, {} visible, {} found, {} invented; residual {}{}",
+        "{}, {}, scene {} on {}: {} there, {} visible, {} found, {} invented; residual {}{}{}",
         trial.solver,
         trial.case,
         trial.scene,
@@ -95,7 +95,11 @@ fn worst(trial: &Trial) -> Table {
         judged.found.len(),
         judged.invented.len(),
         PLAIN.digits(2).text(judged.residual),
-        if judged.misfit { ", misfit" } else { "" }
+        if judged.misfit { ", misfit" } else { "" },
+        match trial.behind_nats.filter(|nats| *nats != 0.0) {
+            Some(nats) => format!("; what is there explains {nats:.1} nats more"),
+            None => String::new(),
+        }
     );
     let there = judged.truth.iter().map(|truth| (Some(truth), truth.found.map(|found| &judged.found[found.index])));
     let invented = judged.invented.iter().map(|index| (None, Some(&judged.found[*index])));
