@@ -10,7 +10,7 @@ use std::sync::{Arc, PoisonError};
 
 use nalgebra::DMatrix;
 
-use super::discs::DiscFit;
+use super::discs::{DiscFit, place_m};
 use super::search::{COLD, FIRST};
 use super::{Better, Certainty, ContactFinder, ContactHypothesis};
 use crate::solve::before::adaptive_mean::Mean;
@@ -22,11 +22,14 @@ use tactomo_physics::baseline::Leakage;
 use tactomo_physics::forward::readings_v;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
+use tactomo_physics::space;
 
 /// How often a fit and what its readings may be off by are brought nearer to each other, at most.
 const RENEWALS: usize = 6;
 /// Factor by which leakage's standard deviation is changed at least.
 const LEAKAGE_FACTOR: f64 = 2.0;
+/// Contacts side by side, at least, that are tried as a single one: two are by [`ContactFinder::one_fewer`].
+const SIDE_BY_SIDE: usize = 3;
 /// How often more contacts are looked for, at most.
 const GROWTHS: usize = 3;
 
@@ -84,7 +87,7 @@ impl ContactFinder {
         }
         let Some(alone) = self.found_by_table(target) else { return self.search_by_discs(followed, target, better) };
         let Some(best) = self.likelier(followed, alone) else { return ControlFlow::Continue(None) };
-        let best = self.without_needless(best);
+        let best = self.or_one_wide(self.without_needless(best));
         told(&best, better)?;
         let fit = &best.hypothesis.fit;
         // In how wide one is another one may be hidden, far from it.
@@ -168,6 +171,24 @@ impl ContactFinder {
             found.hypothesis = ContactHypothesis { certainty, ..ContactHypothesis::of(fewer, &found.target) };
         }
         found
+    }
+
+    /// One wide contact in place of several side by side, where it is likelier: a table has contacts of three times the usual radius at most.
+    fn or_one_wide(&self, found: Informed) -> Informed {
+        let contacts = &found.hypothesis.fit.contacts;
+        let Some(one) = contacts.iter().copied().reduce(|a, b| self.merged(&a, &b)) else { return found };
+        let is_far = |contact: &Contact| space::distance(place_m(contact), place_m(&one)) > self.widest_m;
+        if contacts.len() < SIDE_BY_SIDE || contacts.iter().any(is_far) {
+            return found;
+        }
+        let fitted = self.informed(&found.target, &[one], &found.hypothesis.about()).and_then(|target| {
+            let fit = self.disc_fitter().fit(vec![one], &target, COLD)?;
+            Some(self.settled(Informed { hypothesis: ContactHypothesis::of(fit, &target), target }))
+        });
+        match fitted.filter(|one| self.whole_evidence(one) > self.whole_evidence(&found)) {
+            Some(one) => self.likelier(Some(found.clone()), Some(one)).unwrap_or(found),
+            None => found,
+        }
     }
 
     /// The likelier of two explanations; as sure of its count as the second one is, where that has as many contacts, else as far as the other one is less likely.
