@@ -105,6 +105,8 @@ pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS, const D: usize = 0> 
     searched: T,
     /// How sure it was of the number of contacts that it found.
     certainty: Option<Certainty<T>>,
+    /// Twice the logarithm of the evidence for what was answered last.
+    evidence: Option<T>,
     patience: u32,
     wait: u32,
     /// Whether the last frame was not explained by what was followed, or there was none.
@@ -159,6 +161,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             next_id: 1,
             searched: T::ZERO,
             certainty: None,
+            evidence: None,
             patience: PATIENCE[0],
             wait: 0,
             was_lost: true,
@@ -242,8 +245,13 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         }
     }
 
-    /// Twice the logarithm of the evidence for contacts that are fitted to a frame from where some are, but for what is the same for all; `None` if they make no sense. It tells
-    /// whether what a search found explains a frame less well than what is there. The frames before are forgotten.
+    /// Twice the logarithm of the evidence for the contacts of the last answer, but for what is the same for all explanations of a frame; `None` if there are none.
+    pub fn answer_evidence(&self) -> Option<T> {
+        self.evidence
+    }
+
+    /// The same for contacts that are fitted to a frame from where some are; `None` if they make no sense. It tells whether an answer explains a frame less well than what is
+    /// there. The frames before are forgotten.
     ///
     /// # Errors
     /// [`FrameError`] if it cannot be a frame of the table's detector.
@@ -478,6 +486,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         self.stage = Stage::Idle;
         let before = self.scene;
         self.scene = found.map_or(Scene::EMPTY, |fit| fit.scene);
+        self.evidence = found.map(|fit| fit.evidence);
         self.number(&before);
         self.certainty = self.certainty.filter(|_| is_searched || self.scene.count == before.count);
         let mut answer = self.answer(found, task);

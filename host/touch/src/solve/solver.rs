@@ -46,13 +46,18 @@ pub trait Solver: Send + 'static {
         self.solve(latest)
     }
 
-    /// Twice the logarithm of the evidence for contacts that are fitted to readings from where some are, but for what is the same for all: it tells whether an answer
-    /// explains readings less well than what is there. `None` if they make no sense, or the solver has no evidence for contacts that it has not searched. The frames before are forgotten.
+    /// By how much more the best of some explanations, each fitted from where its contacts are, explains readings than the last answer does, which was to these: as a
+    /// logarithm of the evidence (nats), below zero if none does. It tells whether a search is to blame for an answer. `None` of a solver without evidence for what it has not
+    /// searched. The frames before are forgotten.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
-    fn evidence(&mut self, readings: &Readings, contacts: &[Contact]) -> Result<Option<f64>, SolveError> {
-        let _ = (readings, contacts);
+    fn explained_better(
+        &mut self,
+        readings: &Readings,
+        explanations: &[Vec<Contact>],
+    ) -> Result<Option<f64>, SolveError> {
+        let _ = (readings, explanations);
         Ok(None)
     }
 

@@ -19,7 +19,7 @@ use super::machine::Machine;
 use super::stopwatch::timed;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Contact, Touch};
-use tactomo_touch::solve::{FoundContact, Method, Solution, Solver};
+use tactomo_touch::solve::{Method, Solution, Solver};
 
 pub use self::cases::{Case, Touching, detectors};
 pub use self::judge::{Judged, Match, Place, TrueContact};
@@ -94,8 +94,8 @@ pub struct Trial {
     /// The last answer against the truth.
     #[serde(flatten)]
     pub judged: Judged,
-    /// By how much of the logarithm of the evidence what touches explains the readings better than an answer that is wrong (nats), by the solver's own evidence; none if it has
-    /// no evidence for what it has not searched.
+    /// By how much of the logarithm of the evidence what touches explains the readings better than an answer that is wrong (nats), by the solver's own evidence; none of
+    /// one that is right, or if the solver has no evidence for what it has not searched.
     pub behind_nats: Option<f64>,
     /// Time of the first frame (us).
     pub cold_us: f64,
@@ -194,8 +194,7 @@ impl<'a> Tried<'a> {
         for solver in &mut self.solvers {
             let (solutions, mut times_us) = answered(&mut **solver, &readings)?;
             let judged = Judged::new(detector, &scene.touches, bounds.as_deref(), &solutions[self.frames - 1]);
-            let behind_nats =
-                behind_nats(&mut **solver, &readings[self.frames - 1], &judged, problem.usual_radius_m())?;
+            let behind_nats = behind_nats(&mut **solver, &readings[self.frames - 1], &judged)?;
             let (_, mut tikhonov_us) = answered(&mut *self.tikhonov, &readings)?;
             tikhonov_us.sort_by(f64::total_cmp);
             trials.push(Trial {
@@ -215,32 +214,16 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// By how much of the logarithm of the evidence what touches, or what is visible of it, explains readings better than an answer that is wrong; 0 of one that is right.
-fn behind_nats(
-    solver: &mut dyn Solver,
-    readings: &Readings,
-    judged: &Judged,
-    usual_radius_m: f64,
-) -> Result<Option<f64>, StudyError> {
-    if !judged.is_kind_right || judged.truth.is_empty() {
+/// By how much of the logarithm of the evidence what touches, or what is visible of it, explains readings better than a solver's last answer, which is to these, if that is wrong.
+fn behind_nats(solver: &mut dyn Solver, readings: &Readings, judged: &Judged) -> Result<Option<f64>, StudyError> {
+    if !judged.is_kind_right || judged.faults() == 0 {
         return Ok(None);
     }
-    let disc = |found: &FoundContact| {
-        Contact::flat(found.x_m, found.y_m, found.radius_m.unwrap_or(usual_radius_m), found.conductance_s)
-    };
-    let found: Vec<_> = judged.found.iter().map(disc).collect();
-    let truth: Vec<_> = judged.truth.iter().map(|truth| truth.contact).collect();
-    let visible: Vec<_> = judged.visible().map(|truth| truth.contact).collect();
-    let mut evidence = |contacts: &[Contact]| {
-        let name = solver.name();
-        solver.evidence(readings, contacts).map_err(|error| StudyError::Solve { solver: name.to_owned(), error })
-    };
-    let Some(of_found) = evidence(&found)? else { return Ok(None) };
-    if judged.faults() == 0 {
-        return Ok(Some(0.0));
-    }
-    let of_truth = [evidence(&truth)?, evidence(&visible)?].into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
-    Ok(Some(0.5 * (of_truth - of_found)))
+    let name = solver.name();
+    let truth = judged.truth.iter().map(|truth| truth.contact).collect();
+    let visible = judged.visible().map(|truth| truth.contact).collect();
+    let nats = solver.explained_better(readings, &[truth, visible]);
+    nats.map_err(|error| StudyError::Solve { solver: name.to_owned(), error })
 }
 
 /// What a solver answers from a cold start, and how long each frame took (us).

@@ -40,7 +40,7 @@ pub struct SceneFigures {
     pub all_found: f64,
     /// Share that is wrong though what touches explains the readings better by a nat and more, by the evidence of the solver, if it has that: for these its search is to blame, for others that are wrong
     /// what readings and model hold.
-    pub search: Option<f64>,
+    pub search: f64,
     /// Share that the solver flags as misfit.
     pub misfit: f64,
     /// Of those that are wrong, the share that is flagged as misfit or names the right number of contacts as its alternative.
@@ -152,7 +152,7 @@ impl SceneFigures {
         let share_of = |is: &dyn Fn(&Trial) -> bool| share(trials.iter().map(|trial| is(trial)));
         let wrong = trials.iter().filter(|trial| trial.judged.faults() > 0);
         let warned: Vec<bool> = wrong.map(|trial| trial.judged.is_warned()).collect();
-        let behind: Vec<bool> = trials.iter().filter_map(|trial| Some(trial.behind_nats? > BEHIND_NATS)).collect();
+        let is_behind = |trial: &Trial| trial.behind_nats.is_some_and(|nats| nats > BEHIND_NATS);
         let median = |all: &mut dyn Iterator<Item = f64>| quantiles(all, [0.5]).map(|[median]| median);
         let cold = &mut trials.iter().map(|trial| trial.cold_us / trial.tikhonov_us);
         let next = &mut trials.iter().flat_map(|trial| trial.next_us.iter().map(|us| us / trial.tikhonov_us));
@@ -162,7 +162,7 @@ impl SceneFigures {
             scenes: trials.len(),
             count_right: share_of(&|trial| trial.judged.is_count_right())?,
             all_found: share_of(&|trial| trial.judged.faults() == 0)?,
-            search: share(behind.into_iter()),
+            search: share_of(&is_behind)?,
             misfit: share_of(&|trial| trial.judged.misfit)?,
             cold_us: Quantiles::of(trials.iter().map(|trial| trial.cold_us), 0.95)?,
             next_us: Quantiles::of(trials.iter().flat_map(|trial| trial.next_us.iter().copied()), 0.95)?,
@@ -242,7 +242,7 @@ mod tests {
             kind: None,
             detector: detector.name,
             judged,
-            behind_nats: Some(if off_mm.is_empty() { 2.0 } else { 0.0 }),
+            behind_nats: off_mm.is_empty().then_some(2.0),
             cold_us: 1e3,
             next_us: vec![10.0, 30.0, 20.0],
             tikhonov_us: 5.0,

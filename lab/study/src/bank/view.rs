@@ -35,7 +35,7 @@ pub fn view(report: &Report) -> View {
         .column("scenes", whole, of_scenes(|scenes| Some(scenes.scenes as f64)))
         .column("count", PERCENT, of_scenes(|scenes| Some(scenes.count_right)))
         .column("right", PERCENT, of_scenes(|scenes| Some(scenes.all_found)))
-        .column("search", PERCENT, of_scenes(|scenes| scenes.search))
+        .column("search", PERCENT, of_scenes(|scenes| Some(scenes.search)))
         .column("misfit", PERCENT, of_scenes(|scenes| Some(scenes.misfit)))
         .column("warned", PERCENT, of_scenes(|scenes| scenes.warned))
         .column("cold", MILLISECONDS, of_scenes(|scenes| Some(scenes.cold_us.median)))
@@ -96,7 +96,7 @@ fn worst(trial: &Trial) -> Table {
         judged.invented.len(),
         PLAIN.digits(2).text(judged.residual),
         if judged.misfit { ", misfit" } else { "" },
-        match trial.behind_nats.filter(|nats| *nats != 0.0) {
+        match trial.behind_nats {
             Some(nats) => format!("; what is there explains {nats:.1} nats more"),
             None => String::new(),
         }

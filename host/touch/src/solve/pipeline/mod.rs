@@ -137,9 +137,13 @@ impl Solver for Staged<dyn Solver> {
         Ok(self.stages.after(&rows, solution))
     }
 
-    fn evidence(&mut self, readings: &Readings, contacts: &[Contact]) -> Result<Option<f64>, SolveError> {
+    fn explained_better(
+        &mut self,
+        readings: &Readings,
+        explanations: &[Vec<Contact>],
+    ) -> Result<Option<f64>, SolveError> {
         let seen = self.stages.seen(readings)?;
-        self.half.evidence(&*self.stages.before(&seen)?, contacts)
+        self.half.explained_better(&*self.stages.before(&seen)?, explanations)
     }
 
     fn reset(&mut self) {

@@ -120,11 +120,17 @@ impl Solver for Compiled {
         Ok(solution(&self.answer(readings, None)?))
     }
 
-    fn evidence(&mut self, readings: &Readings, contacts: &[Disc]) -> Result<Option<f64>, SolveError> {
-        let contacts: Vec<_> = contacts.iter().map(core_contact).collect();
-        self.on_frame(readings, None, |core, table, unknown, room, frame| {
-            core.evidence(table, unknown, room, frame, &contacts)
-        })
+    fn explained_better(&mut self, readings: &Readings, explanations: &[Vec<Disc>]) -> Result<Option<f64>, SolveError> {
+        let answered = self.core.answer_evidence().unwrap_or(0.0);
+        let mut best = f64::NEG_INFINITY;
+        for contacts in explanations {
+            let contacts: Vec<_> = contacts.iter().map(core_contact).collect();
+            let evidence = self.on_frame(readings, None, |core, table, unknown, room, frame| {
+                core.evidence(table, unknown, room, frame, &contacts)
+            })?;
+            best = best.max(0.5 * (evidence.unwrap_or(f64::NEG_INFINITY) - answered));
+        }
+        Ok(Some(best))
     }
 
     fn reset(&mut self) {
