@@ -187,6 +187,8 @@ pub(crate) struct Fit<T, const K: usize, const D: usize> {
     pub radius_deviation: T,
     /// Whether it is known that one more contact beside these would not be worth its price.
     pub is_alone: bool,
+    /// Contacts that readings place badly, a bit each, where something is not known of the detector or its board.
+    pub loose: u32,
 }
 
 impl<T: Real, const K: usize, const D: usize> Fit<T, K, D> {
@@ -200,6 +202,7 @@ impl<T: Real, const K: usize, const D: usize> Fit<T, K, D> {
         less_said: T::ONE,
         radius_deviation: T::ZERO,
         is_alone: false,
+        loose: 0,
     };
 }
 

@@ -6,7 +6,7 @@
 
 use crate::births::Births;
 use crate::circuit::Circuit;
-use crate::evidence::{known, ln_volume};
+use crate::evidence::{known, ln_volume, loose};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
 use crate::frame::{Errors, left_v};
 use crate::held::{Held, Kept, Parts, Room};
@@ -386,6 +386,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             if_known: self.normal.if_known,
             less_said: self.normal.less_said(),
             radius_deviation: self.radius_deviation,
+            loose: loose(table, circuit, &self.normal),
             ..Fit::NONE
         };
         Some(self.ended)

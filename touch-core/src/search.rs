@@ -2,6 +2,7 @@
 //! who does it piece by piece.
 
 mod mend;
+mod others;
 
 use self::mend::CLOSE;
 use crate::answer::Certainty;
@@ -52,11 +53,11 @@ enum Awaits {
     Pruned,
     /// Places for one more beside an explanation.
     Another,
-    /// The best explanation without the contact that is looked for anew, and without one that the others may do as well without.
+    /// The best explanation without the contact that is looked for anew, and the other explanation with this number, that may be as good.
     Rest,
-    Fewer(u8),
-    /// That without one, where it came near, fitted to its end.
-    FewerToEnd(u8),
+    Other(u8),
+    /// That one, where it came near, fitted to its end.
+    OtherToEnd(u8),
 }
 
 /// What an explanation is made from.
@@ -77,6 +78,9 @@ pub(crate) struct Terms {
     pub is_known: bool,
     /// Most contacts that are looked for.
     pub most: usize,
+    /// Usual radius of a contact, and where the detector begins and ends along x and y (m).
+    pub radius_m: f32,
+    pub bounds_m: [[f32; 2]; 2],
 }
 
 /// A search, of which one piece after the other is done.
@@ -122,7 +126,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         more_before: false,
         contact: 0,
         anew: 0,
-        terms: Terms { is_known: true, most: K },
+        terms: Terms { is_known: true, most: K, radius_m: 1.0, bounds_m: [[0.0; 2]; 2] },
         by_count: [None; K],
     };
 
@@ -221,21 +225,21 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                 Some(rest) => self.grow(rest),
                 None => self.exchanged(readings),
             },
-            Awaits::Fewer(contact) => {
+            Awaits::Other(contact) => {
                 let is_close = |fewer: &Fit<T, K, D>| {
                     self.kept.is_some_and(|kept| score(fewer) < score(&kept) + T::of(CLOSE) * limit(readings))
                 };
                 match found.filter(is_close) {
                     Some(fewer) => {
-                        self.awaits = Awaits::FewerToEnd(contact);
+                        self.awaits = Awaits::OtherToEnd(contact);
                         Wants::Fit(fewer.scene, T::of(ANY_RADIUS), SEARCHING)
                     }
-                    None => self.leave_out_after(Some(contact)),
+                    None => self.try_others_after(Some(contact)),
                 }
             }
-            Awaits::FewerToEnd(contact) => {
+            Awaits::OtherToEnd(contact) => {
                 self.tried = better(self.tried, found);
-                self.leave_out_after(Some(contact))
+                self.try_others_after(Some(contact))
             }
             Awaits::More | Awaits::First | Awaits::Another => Wants::Nothing(self.best_so_far()),
         }

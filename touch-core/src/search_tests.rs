@@ -10,7 +10,7 @@ use crate::tests::{Fit, Scene, spot};
 type Search = crate::search::Search<f32, 3, 0>;
 type Wants = crate::search::Wants<f32, 3, 0>;
 
-const KNOWN: Terms = Terms { is_known: true, most: 3 };
+const KNOWN: Terms = Terms { is_known: true, most: 3, radius_m: 0.0025, bounds_m: [[-0.03; 2], [0.03; 2]] };
 /// What a contact costs in these fits (squared deviations).
 const PRICE: f32 = 21.0;
 
@@ -195,4 +195,46 @@ fn how_sure_a_number_is_goes_with_the_evidence() {
     // Three leave 20 less and cost 21 more.
     let odds = (-0.5f32).exp();
     assert!((told.share - 1.0 / (1.0 + odds)).abs() < 1e-3 && told.other.unwrap().0 == 3, "{told:?}");
+}
+
+/// What a search that begins with some contacts asks to be fitted and finds, where all contacts together leave as much as noise does and one leaves so much.
+fn others_of(contacts_m: &[[f32; 2]], loose: u32, one_leaves: f32) -> (Vec<Scene>, Option<Fit>) {
+    let begun = contacts_m.iter().fold(Scene::EMPTY, |scene, [x_m, y_m]| scene.with(spot(*x_m, *y_m, 1.0)));
+    let of = |scene: &Scene| {
+        let cost = if scene.count < contacts_m.len() { one_leaves } else { 230.0 };
+        Fit { scene: *scene, loose, ..fit(scene.count, cost, 2000.0) }
+    };
+    let (mut asked, mut search) = (Vec::new(), Search::NONE);
+    let wants = search.begin(Some(of(&begun)), None, 240.0, KNOWN);
+    let fitted = |scene: &Scene, _| {
+        asked.push(*scene);
+        Some(of(scene))
+    };
+    let (_, found) = run(&mut search, wants, fitted, |_| 0.0);
+    (asked, found)
+}
+
+#[test]
+fn contacts_side_by_side_are_tried_as_one() {
+    let row_m = [[0.0, 0.0], [0.006, 0.0], [0.012, 0.0]];
+    let is_one = |scene: &&Scene| scene.count == 1;
+    let (asked, found) = others_of(&row_m, 0, 235.0);
+    let one = asked.iter().find(is_one).unwrap().spots[0];
+    assert!((one.at_m[0] - 0.006).abs() < 1e-6 && one.at_m[1] == 0.0 && found.unwrap().scene.count == 1, "{one:?}");
+    // Of as much resistance as the three beside each other, and a disc of as much second moment: the square of its radius, in usual ones, is one and twice the mean of 2.4 squared, none and that.
+    let three = spot(0.0, 0.0, 1.0).ln_ohm - 3.0_f32.ln();
+    assert!((one.ln_ohm - three).abs() < 1e-4 && (one.ln_radius - 0.5 * 8.68_f32.ln()).abs() < 1e-4, "{one:?}");
+    // It is not better; two are left to be left out, and one is too far.
+    assert_eq!(others_of(&row_m, 0, 400.0).1.unwrap().scene.count, 3);
+    assert!(!others_of(&row_m[..2], 0, 235.0).0.iter().any(|scene| is_one(&scene)));
+    assert!(!others_of(&[[0.0, 0.0], [0.006, 0.0], [0.02, 0.0]], 0, 235.0).0.iter().any(|scene| is_one(&scene)));
+}
+
+#[test]
+fn contacts_that_are_placed_badly_are_tried_beyond_the_ridge_before_a_wall() {
+    let near_m = [[0.001, 0.028]];
+    let moved =
+        |loose: u32| others_of(&near_m, loose, 0.0).0.iter().map(|scene| scene.spots[0].at_m[1]).collect::<Vec<_>>();
+    assert!(moved(0).iter().all(|y_m| *y_m == 0.028));
+    assert!(moved(1).iter().any(|y_m| (y_m - 0.022).abs() < 1e-6), "{:?}", moved(1));
 }

@@ -442,7 +442,17 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         let may_search = !self.is_patient || self.was_lost && self.may_search();
         if is_lost && may_search {
             (self.stage, self.pieces) = (Stage::Searched, 0);
-            let wants = self.search.begin(found, alone, readings, Terms { is_known: task.is_known(), most: self.most });
+            let wants = self.search.begin(
+                found,
+                alone,
+                readings,
+                Terms {
+                    is_known: task.is_known(),
+                    most: self.most,
+                    radius_m: task.table.head().radius_m,
+                    bounds_m: task.table.bounds_m(),
+                },
+            );
             return self.prepare(wants, task);
         }
         if is_lost && !self.was_lost {

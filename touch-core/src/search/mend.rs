@@ -1,5 +1,6 @@
-//! What a search does with an explanation that it has: its contacts are looked for anew, and left out.
+//! What a search does with an explanation that it has: its contacts are looked for anew, and others that are alike are tried.
 
+use super::others::{KINDS, is_unsure};
 use super::{Awaits, SEARCHING, Search, Wants};
 use crate::evidence::{freedom, is_misfit, score};
 use crate::fit::{Fit, TRYING};
@@ -9,18 +10,11 @@ use crate::real::Real;
 /// What the readings say for a contact whose strength they tell to 4 %: that one is there (squared deviations, one over the square of that). Of 120 scenes of five contacts on a
 /// detector that is known 94 have the right number with 200, 96 with this; of 60 as many as with this have it with 3000, where searches take half as long again.
 const SURE: f32 = 500.0;
-/// The same for that the others do not do as well without it. Of 400 scenes on `built205` and 200 on a detector that is known as many are right as with 500, where searches
-/// take a quarter longer.
-const NEEDED: f32 = 50.0;
 /// By how much a contact that was looked for anew has to be better (squared deviations): of two that are alike the first stays.
 const BETTER: f32 = 7.0;
-/// By how much an explanation with fewer contacts may be worse after some steps, as a share of what is a misfit, to be fitted to its end. Of 240 scenes on `built205` as many are
+/// By how much another explanation may be worse after some steps, as a share of what is a misfit, to be fitted to its end. Of 240 scenes on `built205` as many are
 /// right with one, which takes a twentieth longer.
 pub(super) const CLOSE: f32 = 0.3;
-/// Whether the readings hardly tell one of several contacts.
-fn is_unsure<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>, contact: usize, sure: f32) -> bool {
-    fit.scene.count > 1 && fit.information[contact] < T::of(sure)
-}
 
 impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     /// Looks for contacts of an explanation anew beside the others, one at a time: one that went astray early is held there by those that came after it. Where much is left,
@@ -46,7 +40,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
             }
             self.contact += 1;
         }
-        self.leave_out_after(None)
+        self.try_others_after(None)
     }
 
     pub(super) fn exchanged(&mut self, readings: T) -> Wants<T, K, D> {
@@ -63,22 +57,24 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         !is_beyond && (self.more || is_misfit(fit, readings))
     }
 
-    /// Leaves out each contact after this one, if there is one, that the others may do as well without, once they are fitted anew: a second one that was found while
-    /// the first was too small. Then the explanation is the one with fewer that is better, if one is, and is looked through again.
-    pub(super) fn leave_out_after(&mut self, contact: Option<u8>) -> Wants<T, K, D> {
+    /// Tries each other explanation after the one with this number, if there is one, that may be as good: one with fewer is, where a second contact was found while the first was too
+    /// small, or several narrow ones stand for a wide one. Then the explanation is the best of those that are better, if one is, and is looked through again.
+    pub(super) fn try_others_after(&mut self, number: Option<u8>) -> Wants<T, K, D> {
         let Some(kept) = self.kept else { return self.nothing_found() };
-        if contact.is_none() {
+        if number.is_none() {
             self.tried = None;
         }
-        let next = contact.map_or(0, |contact| usize::from(contact) + 1);
-        if let Some(next) = (next..kept.scene.count).find(|contact| is_unsure(&kept, *contact, NEEDED)) {
-            self.awaits = Awaits::Fewer(next as u8);
-            return Wants::Fit(kept.scene.without(next), T::of(ANY_RADIUS), TRYING);
+        let next = number.map_or(0, |number| usize::from(number) + 1);
+        let mut others =
+            (next..KINDS * kept.scene.count).filter_map(|number| Some((number, self.other(&kept, number)?)));
+        if let Some((number, scene)) = others.next() {
+            self.awaits = Awaits::Other(number as u8);
+            return Wants::Fit(scene, T::of(ANY_RADIUS), TRYING);
         }
-        match self.tried.filter(|fewer| score(fewer) < score(&kept)) {
-            Some(fewer) => {
-                self.kept = Some(fewer);
-                self.leave_out_after(None)
+        match self.tried.filter(|tried| score(tried) < score(&kept)) {
+            Some(tried) => {
+                self.kept = Some(tried);
+                self.try_others_after(None)
             }
             None => Wants::Nothing(Some(kept)),
         }

@@ -194,7 +194,7 @@ impl<'a> Tried<'a> {
         for solver in &mut self.solvers {
             let (solutions, mut times_us) = answered(&mut **solver, &readings)?;
             let judged = Judged::new(detector, &scene.touches, bounds.as_deref(), &solutions[self.frames - 1]);
-            let behind_nats = behind_nats(&mut **solver, &readings[self.frames - 1], &judged)?;
+            let behind_nats = behind_nats(&mut **solver, &readings[..self.frames], &judged)?;
             let (_, mut tikhonov_us) = answered(&mut *self.tikhonov, &readings)?;
             tikhonov_us.sort_by(f64::total_cmp);
             trials.push(Trial {
@@ -214,14 +214,16 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// By how much of the logarithm of the evidence what touches, or what is visible of it, explains readings better than a solver's last answer, which is to these, if that is wrong.
-fn behind_nats(solver: &mut dyn Solver, readings: &Readings, judged: &Judged) -> Result<Option<f64>, StudyError> {
+/// By how much of the logarithm of the evidence what touches, or what is visible of it, explains the last of some frames better than a solver's answer to it, if that is wrong.
+fn behind_nats(solver: &mut dyn Solver, frames: &[Readings], judged: &Judged) -> Result<Option<f64>, StudyError> {
     if !judged.is_kind_right || judged.faults() == 0 {
         return Ok(None);
     }
     let name = solver.name();
     let truth = judged.truth.iter().map(|truth| truth.contact).collect();
     let visible = judged.visible().map(|truth| truth.contact).collect();
+    answered(solver, frames)?;
+    let Some(readings) = frames.last() else { return Ok(None) };
     let nats = solver.explained_better(readings, &[truth, visible]);
     nats.map_err(|error| StudyError::Solve { solver: name.to_owned(), error })
 }
