@@ -194,7 +194,10 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                     // Others of the first are on the same hill.
                     return self.grow_beyond(tried);
                 }
-                if !fits && self.starts.get(next).is_some_and(|start| start.gain > T::ZERO) {
+                // One alone that readings place badly reads nearly alike elsewhere.
+                let may_be_elsewhere = self.at.scene.count == 0
+                    && self.tried.is_some_and(|tried| tried.scene.count == 1 && tried.loose != 0);
+                if (!fits || may_be_elsewhere) && self.starts.get(next).is_some_and(|start| start.gain > T::ZERO) {
                     return self.start(next, readings);
                 }
                 let Some(tried) = self.tried else { return self.added(None, readings) };
