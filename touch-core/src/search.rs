@@ -196,7 +196,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                 }
                 // One alone that readings place badly reads nearly alike elsewhere.
                 let may_be_elsewhere = self.at.scene.count == 0
-                    && self.tried.is_some_and(|tried| tried.scene.count == 1 && tried.loose != 0);
+                    && self.tried.is_some_and(|tried| tried.scene.count == 1 && self.is_loose(&tried, 0));
                 if (!fits || may_be_elsewhere) && self.starts.get(next).is_some_and(|start| start.gain > T::ZERO) {
                     return self.start(next, readings);
                 }
