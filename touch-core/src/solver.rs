@@ -268,10 +268,11 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     ) -> Result<Option<T>, FrameError> {
         frame.check(table)?;
         self.reset();
-        let mut errors = Errors::of(frame, table);
+        let (frame, _) = frame.without_broken(table);
+        let mut errors = Errors::of(&frame, table);
         errors.pads.fill(T::ZERO);
         self.fitting.on.begin_frame(&mut errors, frame.volts.len());
-        let task = Task { table, frame, errors: &errors, unknown: Some(unknown) };
+        let task = Task { table, frame: &frame, errors: &errors, unknown: Some(unknown) };
         let scene = contacts.iter().fold(Scene::EMPTY, |scene, contact| scene.with(Spot::of(contact, table)));
         self.fit(scene, T::of(ANY_RADIUS), TO_THE_END);
         let mut bench = Bench { circuit: &mut self.circuit, room: Some(room) };

@@ -95,7 +95,8 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         let ways = walls.map(|(d, wall_m)| (d, T::of(*wall_m), at_m[d] - T::of(*wall_m)));
         let (d, wall_m, way_m) = ways.min_by(|(.., a), (.., b)| a.abs().total_cmp(&b.abs()))?;
         let beyond_m = T::of(2.0 * RIDGE * self.terms.radius_m) - way_m.abs();
-        at_m[d] = wall_m + if way_m < T::ZERO { -beyond_m } else { beyond_m };
+        let [low_m, high_m] = self.terms.bounds_m.map(|ends_m| T::of(ends_m[d]));
+        at_m[d] = (wall_m + if way_m < T::ZERO { -beyond_m } else { beyond_m }).max(low_m).min(high_m);
         (beyond_m > T::ZERO).then_some(moved)
     }
 }

@@ -130,8 +130,8 @@ impl Changes {
                     add_changes(*parameter, *step, detector.electrodes.len(), &mut self.changes);
                 }
             }
-            if let Some(e) = lone_pad(steps) {
-                self.changes.push(Change::Crowding(e, PAD_ERROR as f32));
+            if let Some((e, step)) = lone_pad(steps) {
+                self.changes.push(Change::Crowding(e, PAD_ERROR.copysign(step) as f32));
             }
             let is_alone = matches!(of_fields[..], [(share, _)] if share == 1.0);
             let table = match of_fields[..] {
@@ -176,7 +176,7 @@ impl Changes {
     /// The model's error of each pad that has no direction of its own, in which that is there by now.
     fn add_pads(&mut self, detector: &Detector) {
         let directions = detector.unknowns().directions;
-        let lone: Vec<usize> = directions.iter().filter_map(|steps| lone_pad(steps)).collect();
+        let lone: Vec<usize> = directions.iter().filter_map(|steps| Some(lone_pad(steps)?.0)).collect();
         for e in (0..detector.electrodes.len()).filter(|e| !lone.contains(e)) {
             let start = self.changes.len();
             self.changes.push(Change::Crowding(e, PAD_ERROR as f32));
@@ -208,10 +208,10 @@ impl Changes {
     }
 }
 
-/// The pad whose own impedance is all that a direction changes. What the model's impedance of a pad is off by, which is of the same pattern, is part of that direction.
-fn lone_pad(steps: &[(Parameter, f64)]) -> Option<usize> {
+/// The pad whose own impedance is all that a direction changes, and by how much. What the model's impedance of a pad is off by, which is of the same pattern, is part of that direction.
+fn lone_pad(steps: &[(Parameter, f64)]) -> Option<(usize, f64)> {
     match steps {
-        [(Parameter::Pad(e), _)] => Some(*e),
+        [(Parameter::Pad(e), step)] => Some((*e, *step)),
         _ => None,
     }
 }
