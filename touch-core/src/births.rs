@@ -5,9 +5,10 @@
 
 use core::f32::consts::FRAC_1_SQRT_2;
 
-use crate::circuit::{Circuit, Spot};
+use crate::circuit::{Circuit, PerElectrode, Spot};
 use crate::fit::{Working, held_ohm};
 use crate::held::{Held, Kept};
+use crate::lanes::at_once;
 use crate::normal::{Factor, Normal};
 use crate::products::dot;
 use crate::real::Real;
@@ -36,6 +37,52 @@ struct Place<T> {
     gain: T,
 }
 
+/// What sums over changes by a siemens at a place have in common: with potentials `p`, of which `a` are apart from their mean, that is `c p_g (a_e - a_g + s_e p_g)`, with the
+/// share `s` of the drive that is read.
+struct Sums<T> {
+    /// One over the drive (1/V), and of each row volts by ohm, in noise.
+    per_v: T,
+    per_ohm: PerElectrode<T>,
+    /// Sums over a row of what is left, of that times the shares, of the shares and of their squares.
+    left: PerElectrode<T>,
+    left_share: PerElectrode<T>,
+    share: PerElectrode<T>,
+    share_square: PerElectrode<T>,
+}
+
+impl<T: Real> Sums<T> {
+    const NONE: Self = Self {
+        per_v: T::ZERO,
+        per_ohm: [T::ZERO; MAX_ELECTRODES],
+        left: [T::ZERO; MAX_ELECTRODES],
+        left_share: [T::ZERO; MAX_ELECTRODES],
+        share: [T::ZERO; MAX_ELECTRODES],
+        share_square: [T::ZERO; MAX_ELECTRODES],
+    };
+
+    /// Scalar product of what is left with a place's change, and the square of that.
+    #[inline(always)]
+    fn along_and_square(&self, held: &Held<'_, T>, potentials_ohm: &[T]) -> (T, T) {
+        let count = T::of(potentials_ohm.len() as u32);
+        // As differences, of which the large constant of a light contact takes no digits.
+        let mean_ohm = potentials_ohm.iter().copied().sum::<T>() / count;
+        let mut apart = [T::ZERO; MAX_ELECTRODES];
+        apart.iter_mut().zip(potentials_ohm).for_each(|(apart, ohm)| *apart = *ohm - mean_ohm);
+        let apart = &apart[..potentials_ohm.len()];
+        let squares = dot(apart, apart);
+        let (mut along, mut square) = (T::ZERO, T::ZERO);
+        let rows = held.there_v().chunks_exact(apart.len()).zip(held.left().chunks_exact(apart.len()));
+        for ((g, (there_v, left)), own) in rows.enumerate().zip(potentials_ohm) {
+            let (per_ohm, down) = (self.per_ohm[g] * *own, apart[g]);
+            along += per_ohm * (dot(left, apart) - down * self.left[g] + *own * self.left_share[g]);
+            let by_share = self.per_v * dot(there_v, apart) - down * self.share[g];
+            let of_own = *own * (T::of(2.0) * by_share + *own * self.share_square[g]);
+            square += per_ohm * per_ohm * (squares + count * down * down + of_own);
+        }
+        (along, square)
+    }
+}
+
 /// What is left by contacts on a detector whose patterns are held.
 pub(crate) struct Births<'a, 'h, T, const K: usize, const D: usize> {
     pub task: Task<'a, T>,
@@ -54,19 +101,23 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
     pub fn look(&mut self, best: &mut Candidates<T>, work: &mut Working<'_, K>) {
         let Some(factor) = Factor::of(self.normal, T::of(DAMPING)) else { return };
         self.held.whiten(self.kept.count);
-        self.held.note_there(self.detector, self.circuit);
         let table = self.task.table;
+        let n = table.electrodes();
         let mut change = [T::ZERO; MAX_ELECTRODES * MAX_ELECTRODES];
-        let change = &mut change[..table.electrodes() * table.electrodes()];
+        let change = &mut change[..n * n];
+        let sums = self.sums();
         let mut list = [Place { cell: (0, 0), gain: T::ZERO }; CLOSELY];
         for cell in places(table) {
             if !self.is_free(cell) {
                 continue;
             }
             work.looked();
-            self.change(cell, change);
-            let along = dot(change, self.held.left());
-            let gain = along * along / dot(change, change);
+            let (_, potentials_ohm) = self.potentials_ohm(cell);
+            let (along, square) = at_once(
+                #[inline(always)]
+                || sums.along_and_square(self.held, &potentials_ohm[..n]),
+            );
+            let gain = along * along / square;
             let last = &mut list[CLOSELY - 1];
             if along > T::ZERO && gain > last.gain {
                 *last = Place { cell, gain };
@@ -150,21 +201,50 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
         table.holds(at_m[0], at_m[1]) && there.all(is_apart)
     }
 
-    /// What a siemens at a place changes, in noise; returns the own field of a disc there (ohm).
-    fn change(&self, (i, j): (usize, usize), change: &mut [T]) -> T {
-        let (table, n) = (self.task.table, self.task.table.electrodes());
+    /// The own field of a disc at a place, and potentials there without one, for 1 A into each electrode (ohm).
+    fn potentials_ohm(&self, (i, j): (usize, usize)) -> (T, PerElectrode<T>) {
+        let table = self.task.table;
         let (mut fields_ohm, mut potentials_ohm) = ([T::ZERO; MAX_ELECTRODES], [T::ZERO; MAX_ELECTRODES]);
         let own_ohm = table.rough(i, j, &mut fields_ohm);
         self.circuit.potentials_ohm(self.detector, table.middle_m(i, j), &fields_ohm, &mut potentials_ohm);
-        let drive_v = T::of(table.head().drive_v);
+        (own_ohm, potentials_ohm)
+    }
+
+    /// Volts by ohm of a row, in noise.
+    fn per_ohm(&self, g: usize) -> T {
+        T::of(self.task.table.head().drive_v) / (self.circuit.loads_ohm[g] * self.noise_v)
+    }
+
+    /// What a siemens at a place changes, in noise; returns the own field of a disc there (ohm).
+    fn change(&self, cell: (usize, usize), change: &mut [T]) -> T {
+        let (own_ohm, potentials_ohm) = self.potentials_ohm(cell);
+        let per_v = T::ONE / T::of(self.task.table.head().drive_v);
+        let n = self.task.table.electrodes();
         for ((g, row), there_v) in change.chunks_exact_mut(n).enumerate().zip(self.held.there_v().chunks_exact(n)) {
             let own = potentials_ohm[g];
-            let per_ohm = drive_v * own / (self.circuit.loads_ohm[g] * self.noise_v);
+            let per_ohm = self.per_ohm(g) * own;
             for (e, value) in row.iter_mut().enumerate() {
-                *value = per_ohm * (potentials_ohm[e] - (T::ONE - there_v[e] / drive_v) * own);
+                *value = per_ohm * (potentials_ohm[e] - (T::ONE - per_v * there_v[e]) * own);
             }
         }
         own_ohm
+    }
+
+    /// What sums over a place's changes have in common.
+    fn sums(&self) -> Sums<T> {
+        let n = self.task.table.electrodes();
+        let per_v = T::ONE / T::of(self.task.table.head().drive_v);
+        let mut sums = Sums::NONE;
+        sums.per_v = per_v;
+        let rows = self.held.there_v().chunks_exact(n).zip(self.held.left().chunks_exact(n));
+        for (g, (there_v, left)) in rows.enumerate() {
+            sums.per_ohm[g] = self.per_ohm(g);
+            sums.left[g] = left.iter().copied().sum();
+            sums.left_share[g] = per_v * dot(there_v, left);
+            sums.share[g] = per_v * there_v.iter().copied().sum::<T>();
+            sums.share_square[g] = per_v * per_v * dot(there_v, there_v);
+        }
+        sums
     }
 
     /// Its square, but for what steps of the detector and contacts could do as well.

@@ -23,6 +23,7 @@ use crate::answer::Contact;
 use crate::disc::Disc;
 use crate::fields::Sample;
 use crate::head::Head;
+use crate::lanes::at_once;
 use crate::real::Real;
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, Table};
 use crate::unknown::Detector;
@@ -139,6 +140,7 @@ impl<T: Real> Loaded<T> {
     };
 
     /// Puts a contact there.
+    #[inline(always)]
     fn load(&mut self, detector: &Detector<'_, T>, spot: Spot<T>) {
         let (head, n) = (detector.table.head(), detector.table.electrodes());
         let spread_m = T::of(head.radius_m) * spot.ln_radius.exp();
@@ -158,6 +160,7 @@ impl<T: Real> Loaded<T> {
     }
 
     /// Finds how the current crowds, and what moment a slope drives.
+    #[inline(always)]
     fn crowd(&mut self, head: &Head, spread_m: T, n: usize) {
         let (ohm, own_ohm) = (self.ohm, self.sample.value[n]);
         let disc = Disc::of(head, self.share, spread_m, own_ohm, ohm);
@@ -195,12 +198,14 @@ impl<T: Real> Loaded<T> {
     }
 
     /// Half of the bend along x less that along y, and that along both, of what is picked of all fields at the contact.
+    #[inline(always)]
     fn bends(&self, values: impl Fn(&[T]) -> T) -> [T; 2] {
         let [xx, xy, yy] = [0, 1, 2].map(|which| values(&self.sample.turning[which]));
         [T::of(0.5) * (xx - yy), xy]
     }
 
     /// Finds what drives the couples of currents at an electrode, and how that changes.
+    #[inline(always)]
     fn drive(&mut self, head: &Head, n: usize, e: usize) {
         let half = T::of(0.5) * self.currents[e];
         for d in 0..2 {
@@ -269,6 +274,14 @@ impl<T: Real, const K: usize> Circuit<T, K> {
 
     /// Solves for some contacts, `K` at most; `false` if their fields cannot be those of contacts, as when two are at one place.
     pub fn solve(&mut self, detector: &Detector<'_, T>, spots: &[Spot<T>]) -> bool {
+        at_once(
+            #[inline(always)]
+            || self.solve_all(detector, spots),
+        )
+    }
+
+    #[inline(always)]
+    fn solve_all(&mut self, detector: &Detector<'_, T>, spots: &[Spot<T>]) -> bool {
         self.count = spots.len().min(K);
         for (loaded, spot) in self.loaded.iter_mut().zip(spots) {
             loaded.load(detector, *spot);
@@ -290,6 +303,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     }
 
     /// Field between two contacts (ohm), its derivatives by the place of each of both (ohm/m), and its bends there (ohm/m2).
+    #[inline(always)]
     fn between(&self, detector: &Detector<'_, T>, k: usize, l: usize) -> (T, [[T; 2]; 2], [[T; 2]; 2]) {
         let (one, other) = (&self.loaded[k], &self.loaded[l]);
         let n = detector.table.electrodes();
@@ -309,6 +323,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         (ohm, slopes, bends)
     }
 
+    #[inline(always)]
     fn find_currents(&mut self, table: &Table<'_>, matrix: &[[T; K]; K]) -> bool {
         let count = self.count;
         let mut factor = [[T::ZERO; K]; K];
@@ -358,6 +373,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         true
     }
 
+    #[inline(always)]
     fn find_slopes(&mut self, table: &Table<'_>) {
         for k in 0..self.count {
             for d in 0..2 {
@@ -376,6 +392,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     }
 
     /// Finds what drives the quadrupoles at an electrode.
+    #[inline(always)]
     fn find_bends(&mut self, n: usize, k: usize, e: usize) {
         // Of the bend of the contact's own field that of a mirror's is a quarter.
         let quarter = T::of(0.25) * self.loaded[k].currents[e];
@@ -388,6 +405,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     }
 
     /// Takes what other contacts' currents change of the field at a contact with its radius from what electrodes do.
+    #[inline(always)]
     fn take_widened(&mut self, table: &Table<'_>, k: usize) {
         let n = table.electrodes();
         let by_radius_ohm = self.loaded[k].by_radius_ohm;
@@ -400,6 +418,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         }
     }
 
+    #[inline(always)]
     fn find_loads(&mut self, detector: &Detector<'_, T>) -> bool {
         for g in 0..detector.table.electrodes() {
             let mut ohm = detector.pads_ohm(g, g) - self.constant_ohm[g] + detector.switch_ohm();
@@ -418,6 +437,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     }
 
     /// What is there to be read while an electrode is grounded (V).
+    #[inline(always)]
     pub fn row_v(&self, detector: &Detector<'_, T>, g: usize, volts: &mut [T]) {
         let own_ohm = detector.pads_ohm(g, g) + detector.switch_ohm();
         let per_ohm = T::of(detector.table.head().drive_v) / self.loads_ohm[g];
@@ -450,7 +470,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
         }
         for one in &self.loaded[..self.count] {
             let by_walls: T = (0..n).map(|e| one.walls_ohm[e] * fields_ohm[e]).sum();
-            let ohm = detector.value_by_ways_ohm(at_m, one.spot.at_m) + by_walls + one.walls_ohm[n];
+            let ohm = detector.rough_by_ways_ohm(at_m, one.spot.at_m) + by_walls + one.walls_ohm[n];
             (0..n).for_each(|e| all_ohm[e] -= ohm * one.currents[e]);
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::circuit::TURNED;
 use crate::head::Head;
+use crate::lanes::at_once;
 use crate::real::Real;
 use crate::spline::weights;
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, OTHERS, QUANTITIES, RADII, Table};
@@ -70,35 +71,54 @@ impl<'a> Table<'a> {
 
     /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives; second ones as far as `bent` says.
     pub(crate) fn sample<T: Real>(&self, at_m: [T; 2], wide: T, bent: T, sample: &mut Sample<T>) {
+        at_once(
+            #[inline(always)]
+            || {
+                let stencil = Stencil::of(self, at_m);
+                let [small, large] = [0, 1].map(|which| self.of_radius(which, &stencil));
+                let between = |share: T, w: usize, q: usize| small[w][q] + share * (large[w][q] - small[w][q]);
+                for q in 0..self.electrodes + OTHERS {
+                    let wider = |w: usize| large[w][q] - small[w][q];
+                    (sample.value[q], sample.wider[q]) = (between(wide, 0, q), wider(0));
+                    for d in 0..2 {
+                        (sample.slope[d][q], sample.turning[3 + d][q]) = (between(wide, 1 + d, q), wider(1 + d));
+                    }
+                    (0..3).for_each(|which| sample.turning[which][q] = between(bent, 3 + which, q));
+                }
+            },
+        );
+    }
+
+    /// All quantities of a disc of one of the radii at a place, by each kind of weight.
+    #[inline(always)]
+    fn of_radius<T: Real>(&self, which: usize, stencil: &Stencil<T>) -> [[T; QUANTITIES]; 6] {
         let count = self.electrodes + OTHERS;
-        let stencil = Stencil::of(self, at_m);
-        *sample = Sample::NONE;
-        for (which, node) in stencil.nodes.into_iter().enumerate() {
-            let [value, slope_x, slope_y, bend @ ..] = stencil.weights.each_ref().map(|weights| weights[which]);
-            let codes = self.coefficient(node);
-            let (small, large) = codes.split_at(count.min(codes.len()));
-            for (index, (small, large)) in small.iter().zip(large).enumerate() {
-                let [small, large]: [T; 2] = [self.decoded(index, *small), self.decoded(count + index, *large)];
-                let code = small + wide * (large - small);
-                let bent = small + bent * (large - small);
-                sample.value[index] += value * code;
-                sample.slope[0][index] += slope_x * code;
-                sample.slope[1][index] += slope_y * code;
-                let (bends, widened) = sample.turning.split_at_mut(bend.len());
-                for (sum, bend) in bends.iter_mut().zip(bend) {
-                    sum[index] += bend * bent;
-                }
-                sample.wider[index] += value * (large - small);
-                for (sum, slope) in widened.iter_mut().zip([slope_x, slope_y]) {
-                    sum[index] += slope * (large - small);
-                }
+        let mut sums = [[T::ZERO; QUANTITIES]; 6];
+        for (k, node) in stencil.nodes.into_iter().enumerate() {
+            let codes = self.coefficient(node).get(which * count..(which + 1) * count).unwrap_or(&[]);
+            let mut values = [T::ZERO; QUANTITIES];
+            values.iter_mut().zip(codes).for_each(|(value, code)| *value = T::of(i16::from_le_bytes(*code)));
+            for (sums, weights) in sums.iter_mut().zip(&stencil.weights) {
+                sums.iter_mut().zip(&values).take(count).for_each(|(sum, value)| *sum += weights[k] * *value);
             }
         }
+        for q in 0..count {
+            let [first, step] = self.scale(which * count + q);
+            sums.iter_mut().for_each(|sums| sums[q] *= step);
+            // Weights of the value sum up to one, those of derivatives to nothing.
+            sums[0][q] += first;
+        }
+        sums
+    }
+
+    /// What the code nought of a quantity stands for, and a step of codes.
+    fn scale<T: Real>(&self, quantity: usize) -> [T; 2] {
+        [0, 1].map(|part| T::of(self.codes.at(2 * quantity + part)))
     }
 
     /// The value that a code of a quantity stands for.
     fn decoded<T: Real>(&self, quantity: usize, code: [u8; 2]) -> T {
-        let [first, step] = [0, 1].map(|part| T::of(self.codes.at(2 * quantity + part)));
+        let [first, step]: [T; 2] = self.scale(quantity);
         first + step * T::of(i16::from_le_bytes(code))
     }
 
@@ -108,7 +128,7 @@ impl<'a> Table<'a> {
         let mean = |quantity: usize| {
             let codes = corners.iter().filter_map(|codes| codes.get(quantity));
             let sum: i32 = codes.map(|code| i32::from(i16::from_le_bytes(*code))).sum();
-            let [first, step] = [0, 1].map(|part| T::of(self.codes.at(2 * quantity + part)));
+            let [first, step]: [T; 2] = self.scale(quantity);
             first + T::of(0.25) * step * T::of(sum)
         };
         (0..self.electrodes).for_each(|e| fields_ohm[e] = mean(e));

@@ -236,6 +236,9 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     pub(crate) steps: u8,
     tries: u8,
     pub(crate) has_looked: bool,
+    /// Where the detector is not known: whether the circuit is solved and read where the scene is, and whether derivatives are those there.
+    pub(crate) is_solved: bool,
+    pub(crate) is_derived: bool,
     /// What another round has to gain (squared deviations).
     pub(crate) worth: T,
     /// What is not known of a detector, and the scene whose patterns are held.
@@ -258,6 +261,8 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         steps: 0,
         tries: 0,
         has_looked: false,
+        is_solved: false,
+        is_derived: false,
         worth: T::ZERO,
         on: OnUnknown::NONE,
         held_at: Scene::EMPTY,
@@ -268,7 +273,6 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// Begins to step from a scene to where it fits best, so many steps at most.
     pub fn begin(&mut self, scene: Scene<T, K, D>, radius_deviation: T, steps: u8) {
-        self.on.is_held &= self.on.damping == T::ONE;
         self.goes_on = false;
         self.on.damping = T::ONE;
         self.worth = T::of(if steps <= TRYING { ROUGHLY } else { EXACTLY });

@@ -54,7 +54,7 @@ impl<T: Real> Room<'_, T> {
 
     pub(crate) fn parts(&mut self, table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> Parts<'_, T> {
         let (moved, mut rest) = self.numbers.split_at_mut(Layout::of(table, unknown).numbers());
-        let [there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left, read_v] =
+        let [there_v, patterns, scaled, solved, factor, squares, products, taken, columns, slopes, left, read_v] =
             counts(table, unknown, contacts).map(|count| {
                 let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
                 rest = after;
@@ -63,12 +63,12 @@ impl<T: Real> Room<'_, T> {
         let (shares, fields) = self.floats.split_at_mut(unknown.tables);
         let fields = &mut fields[..contacts * unknown.of_place(table.electrodes())];
         let held =
-            Held { fields, there_v, patterns, scaled, solved, factor, products, taken, columns, slopes, left, read_v };
+            Held { fields, there_v, patterns, scaled, solved, factor, squares, products, taken, columns, slopes, left, read_v };
         Parts { moved, shares, held }
     }
 }
 
-fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 11] {
+fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 12] {
     let (readings, count) = (table.electrodes() * table.electrodes(), unknown.directions.len());
     let parameters = PARAMETERS * contacts;
     [
@@ -77,6 +77,7 @@ fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 
         count,
         count,
         count * count,
+        count,
         count,
         count,
         parameters * count,
@@ -97,9 +98,10 @@ pub(crate) struct Held<'m, T> {
     /// `U s` and `U'^-1 s` of where the detector is.
     scaled: &'m mut [T],
     solved: &'m mut [T],
-    /// `U`, row by row.
+    /// `U`, row by row, and below it products of the patterns with each other; their squares.
     factor: &'m mut [T],
-    /// `U'^-1 g` of the last look, and of the last that was taken; `U'^-1 p' J`, a row a parameter.
+    squares: &'m mut [T],
+    /// `U'^-1 p' r` of the last look, and `U'^-1 g` of the last that was taken; `U'^-1 p' J`, a row a parameter.
     products: &'m mut [T],
     taken: &'m mut [T],
     columns: &'m mut [T],
@@ -118,6 +120,14 @@ pub(crate) struct Projected<'a, T> {
     /// `U s` and `U'^-1 s` of where the detector is.
     pub scaled: &'a [T],
     pub solved: &'a [T],
+}
+
+impl<T: Real> Projected<'_, T> {
+    /// What the best steps of the detector make of the sum of squares: `s' s` is `(U'^-1 s)' (U s)`.
+    pub fn less(&self) -> T {
+        let Self { left, scaled, solved, .. } = self;
+        dot(solved, scaled) - dot(left, left) - dot(solved, solved) + T::of(2.0) * dot(left, solved)
+    }
 }
 
 /// Which directions count.
@@ -139,30 +149,27 @@ impl<const D: usize> Kept<D> {
 }
 
 impl<T: Real> Held<'_, T> {
-    /// Takes the patterns of contacts in noise of a deviation (V), of those readings that say something; steps are damped by more than one in place of `I`. `None` if they make
-    /// no sense.
+    /// Takes the patterns of contacts that were read, in noise of a deviation (V), of those readings that say something; that is so many times
+    /// what noise is, in which directions count.
     pub fn hold<const K: usize, const D: usize>(
         &mut self,
         detector: &Detector<'_, T>,
         unknown: &Unknown<'_>,
         circuit: &Circuit<T, K>,
-        noise_v: T,
-        damping: T,
+        [noise_v, times]: [T; 2],
         says: impl Fn(usize, T) -> bool,
-    ) -> Option<Kept<D>> {
-        self.note_there(detector, circuit);
+    ) -> Kept<D> {
         Patterns::new(detector, unknown, circuit, self.there_v, self.fields).write(self.patterns, self.left);
         let readings = self.there_v.len();
-        for (index, scale) in self.left.iter_mut().enumerate() {
-            let read_v = detector.read_v(index % detector.table.electrodes(), self.there_v[index]);
-            *scale = if says(index, read_v) { T::ONE / noise_v } else { T::ZERO };
+        for (index, (scale, read_v)) in self.left.iter_mut().zip(&*self.read_v).enumerate() {
+            *scale = if says(index, *read_v) { T::ONE / noise_v } else { T::ZERO };
         }
-        let mut kept = Kept::NONE;
+        let (mut kept, least) = (Kept::NONE, T::of(LEAST_SQUARE) / (times * times));
         for direction in 0..unknown.directions.len() {
             let (before, from) = self.patterns.split_at_mut(direction * readings);
             let pattern = &mut from[..readings];
             pattern.iter_mut().zip(&*self.left).for_each(|(value, scale)| *value *= *scale);
-            if dot(pattern, pattern) > T::of(LEAST_SQUARE) {
+            if dot(pattern, pattern) > least {
                 if let Some(to) = before.get_mut(kept.count * readings..(kept.count + 1) * readings) {
                     to.copy_from_slice(pattern);
                 }
@@ -170,14 +177,34 @@ impl<T: Real> Held<'_, T> {
                 kept.count += 1;
             }
         }
-        self.factorise(kept.count, damping)?;
-        Some(kept)
+        self.multiply(kept.count);
+        kept
     }
 
-    /// Notes what is there to be read.
-    pub fn note_there<const K: usize>(&mut self, detector: &Detector<'_, T>, circuit: &Circuit<T, K>) {
-        let rows = self.there_v.chunks_exact_mut(detector.table.electrodes());
-        rows.enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
+    /// Notes products of the patterns with each other.
+    fn multiply(&mut self, count: usize) {
+        let Self { patterns, factor, squares, there_v, .. } = self;
+        let (readings, factor) = (there_v.len(), &mut factor[..count * count]);
+        let patterns = &patterns[..readings * count];
+        // In the triangle below the factor.
+        T::products(patterns, patterns, readings, true, |i, j, product| factor[i * count + j] = product);
+        (0..count).for_each(|i| squares[i] = factor[i * count + i]);
+    }
+
+    /// Notes what contacts that are solved make: what is there to be read, and what channels read of it (V).
+    pub fn read<const K: usize>(&mut self, detector: &Detector<'_, T>, circuit: &Circuit<T, K>) {
+        let n = detector.table.electrodes();
+        let rows = self.there_v.chunks_exact_mut(n).zip(self.read_v.chunks_exact_mut(n));
+        at_once(
+            #[inline(always)]
+            || {
+                for (g, (there_v, read_v)) in rows.enumerate() {
+                    circuit.row_v(detector, g, there_v);
+                    let all = read_v.iter_mut().zip(there_v).enumerate();
+                    all.for_each(|(e, (read_v, there_v))| *read_v = detector.read_v(e, *there_v));
+                }
+            },
+        );
     }
 
     /// What is there to be read (V).
@@ -185,12 +212,24 @@ impl<T: Real> Held<'_, T> {
         self.there_v
     }
 
-    fn factorise(&mut self, count: usize, damping: T) -> Option<()> {
-        let Self { patterns, factor, there_v, .. } = self;
-        let (readings, factor) = (there_v.len(), &mut factor[..count * count]);
-        let patterns = &patterns[..readings * count];
-        T::products(patterns, patterns, readings, true, |i, j, product| factor[j * count + i] = product);
-        (0..count).for_each(|i| factor[i * count + i] += damping);
+    /// Takes what is held to so many times the noise.
+    pub fn rescale(&mut self, count: usize, times: T) {
+        let (per_time, per_square) = (T::ONE / times, T::ONE / (times * times));
+        self.patterns[..self.there_v.len() * count].iter_mut().for_each(|value| *value *= per_time);
+        self.squares[..count].iter_mut().for_each(|square| *square *= per_square);
+        for i in 0..count {
+            self.factor[i * count..i * count + i].iter_mut().for_each(|product| *product *= per_square);
+        }
+    }
+
+    /// Factorises `I + p' p`, or where steps are damped with more than one in place of `I`; `None` if it makes no sense.
+    pub fn factorise(&mut self, count: usize, damping: T) -> Option<()> {
+        let Self { factor, squares, .. } = self;
+        let factor = &mut factor[..count * count];
+        for i in 0..count {
+            factor[i * count + i] = damping + squares[i];
+            (i + 1..count).for_each(|j| factor[i * count + j] = factor[j * count + i]);
+        }
         at_once(
             #[inline(always)]
             || factorise(factor, count),
@@ -207,29 +246,27 @@ impl<T: Real> Held<'_, T> {
         forward(self.factor, count, self.solved);
     }
 
-    /// Begins a look.
-    pub fn begin(&mut self) {
-        self.slopes.fill(T::ZERO);
-        self.left.fill(T::ZERO);
-    }
-
-    /// Notes what channels read of contacts (V).
-    pub fn read_v(&mut self) -> &mut [T] {
+    /// What channels read of contacts (V).
+    pub fn read_v(&self) -> &[T] {
         self.read_v
     }
 
-    /// Notes what that leaves of a frame of which all readings say something, in noise.
-    pub fn leave_of(&mut self, volts: &[T], noise_v: T) {
-        for ((left, volts), read_v) in self.left.iter_mut().zip(volts).zip(&*self.read_v) {
-            *left = (*volts - *read_v) / noise_v;
-        }
+    /// Notes what that leaves of a frame, in noise.
+    pub fn leave(&mut self, left: impl Fn(usize, T) -> T) {
+        let all = self.left.iter_mut().zip(&*self.read_v).enumerate();
+        all.for_each(|(index, (to, read_v))| *to = left(index, *read_v));
     }
 
-    /// Notes a reading, of which so much is left, with its derivatives by the parameters, all in noise.
-    pub fn note(&mut self, index: usize, left: T, slope: &[T]) {
-        let rows = self.slopes.chunks_exact_mut(self.left.len());
-        rows.zip(slope).for_each(|(row, slope)| row[index] = *slope);
-        self.left[index] = left;
+    /// Squares of what is left, at least, with those of the steps of the detector that leave it.
+    pub fn least(&mut self, count: usize) -> T {
+        self.project_left(count);
+        dot(self.left, self.left) + self.projected(count).less()
+    }
+
+    /// Notes the derivatives of the readings while an electrode is grounded by a parameter, in noise.
+    pub fn note(&mut self, g: usize, parameter: usize, slopes: &[T]) {
+        let first = parameter * self.left.len() + g * slopes.len();
+        self.slopes[first..first + slopes.len()].copy_from_slice(slopes);
     }
 
     /// The pattern of a direction, in noise.

@@ -53,7 +53,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     /// Whether derivatives are those of contacts of a scene, near enough: where patterns serve too, or within what is known of them.
     fn has_gain_near(&self, scene: &Scene<T, K, D>, on: &On<'_, '_, T, K>) -> bool {
         let table = on.task.table;
-        if scene.is_near(&self.ended.scene, table) {
+        if scene.is_near(&self.ended.scene, T::of(NEAR), table) {
             return true;
         }
         let Some(covariance) = self.normal.covariance(&known(table, on.circuit)) else { return false };
@@ -64,9 +64,8 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// Sums up what the contacts that were read last leave of a frame.
     fn leave(&self, on: &mut On<'_, '_, T, K>, normal: &mut Normal<T, K>) {
-        let noise_v = on.task.errors.variance_v2.sqrt();
+        on.leave(on.task.errors.variance_v2.sqrt());
         let held = &mut on.parts.held;
-        held.leave_of(on.task.frame.volts, noise_v);
         normal.sum_up_left(on.circuit, self.radius_deviation, (held, self.on.kept.count));
     }
 }

@@ -61,7 +61,7 @@ fn between_ohm(table: &Table<'_>, fields: [&[f64]; 2], [to_m, from_m]: [[f32; 2]
     let n = table.electrodes();
     let pairs = (0..=n).flat_map(|s| (0..=n).map(move |t| (s, t)));
     let by_walls: f64 = pairs.map(|(s, t)| fields[0][s] * f64::from(table.walls.of_pair(s, t)) * fields[1][t]).sum();
-    f64::from(Detector::described(table).value_by_ways_ohm(to_m, from_m)) + by_walls
+    f64::from(Detector::described(table).by_ways_ohm(to_m, from_m).0) + by_walls
 }
 
 /// Readings by Kirchhoff's laws: contacts and couples of currents are nodes, all equations are solved at once.

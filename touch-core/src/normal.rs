@@ -61,14 +61,19 @@ impl<T: Real, const K: usize> Normal<T, K> {
     ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         let (table, head, n) = (detector.table, detector.table.head(), detector.table.electrodes());
-        let mut volts = [T::ZERO; MAX_ELECTRODES];
+        let (mut volts, mut slopes) = ([T::ZERO; MAX_ELECTRODES], [[[T::ZERO; MAX_ELECTRODES]; PARAMETERS]; K]);
         for g in 0..n {
             circuit.row_v(detector, g, &mut volts);
             let (mut by_pad, mut left_by_pad, mut pad) = (Vector::<T, K>::ZERO, T::ZERO, T::ZERO);
-            let slopes = RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m));
+            RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m)).of_readings(
+                circuit,
+                head,
+                &volts[..n],
+                &mut slopes,
+            );
             for e in 0..n {
                 let Some(left_v) = left_v(frame, g * n + e, T::of(head.full_v), volts[e]) else { continue };
-                let slope = slopes.of_reading(circuit, head, e, volts[e]);
+                let slope: Vector<T, K> = Vector(slopes.each_ref().map(|of_one| of_one.each_ref().map(|row| row[e])));
                 if frame.says_at(g * n + e) != Says::AtMost {
                     self.hear(&slope);
                 }
@@ -97,7 +102,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
         self.add_known(circuit, radius_deviation);
     }
 
-    /// The same with what is not known of the detector, of which patterns are held, in the covariance.
+    /// The same, of contacts that were read, with what is not known of the detector, of which patterns are held, in the covariance.
     pub fn sum_up_held(
         &mut self,
         detector: &Detector<'_, T>,
@@ -109,24 +114,33 @@ impl<T: Real, const K: usize> Normal<T, K> {
     ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         let (head, n) = (detector.table.head(), detector.table.electrodes());
-        held.begin();
-        let mut volts = [T::ZERO; MAX_ELECTRODES];
+        let mut slopes = [[[T::ZERO; MAX_ELECTRODES]; PARAMETERS]; K];
         for g in 0..n {
-            circuit.row_v(detector, g, &mut volts);
-            let slopes = RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m));
-            for e in 0..n {
-                let (index, read_v) = (g * n + e, detector.read_v(e, volts[e]));
-                held.read_v()[index] = read_v;
-                let Some(left_v) = left_v(frame, index, T::of(head.full_v), read_v) else { continue };
-                let mut slope = slopes.of_reading(circuit, head, e, volts[e]);
-                let scale = detector.gain(e, volts[e]) / noise_v;
-                slope[..self.count].iter_mut().for_each(|slope| *slope *= scale);
-                held.note(index, left_v / noise_v, &slope[..self.count]);
-                if frame.says_at(index) != Says::AtMost {
-                    self.hear(&slope);
+            let there_v = &held.there_v()[g * n..(g + 1) * n];
+            RowSlopes::new(circuit, g, T::of(head.drive_v), T::of(head.radius_m)).of_readings(
+                circuit,
+                head,
+                there_v,
+                &mut slopes,
+            );
+            // What readings that say nothing would change, and what is left of them, is none.
+            let mut scales = [T::ZERO; MAX_ELECTRODES];
+            for (e, there_v) in there_v.iter().enumerate() {
+                let left = left_v(frame, g * n + e, T::of(head.full_v), held.read_v()[g * n + e]);
+                scales[e] = left.map_or(T::ZERO, |_| detector.gain(e, *there_v) / noise_v);
+            }
+            for (i, row) in slopes.as_flattened_mut().iter_mut().enumerate().take(self.count) {
+                row.iter_mut().zip(&scales).for_each(|(slope, scale)| *slope *= *scale);
+                held.note(g, i, &row[..n]);
+                if i % PARAMETERS == STRENGTH {
+                    let speaks = |e: &usize| frame.says_at(g * n + *e) != Says::AtMost;
+                    self.said[i / PARAMETERS] += (0..n).filter(speaks).map(|e| row[e] * row[e]).sum::<T>();
                 }
             }
         }
+        held.leave(|index, read_v| {
+            left_v(frame, index, T::of(head.full_v), read_v).map_or(T::ZERO, |left_v| left_v / noise_v)
+        });
         held.project(count, self.count);
         self.cost = dot(held.left(), held.left());
         held.products(self.count, |i, j, product| self.matrix[i][j] = product, |i, product| self.pull[i] = product);
@@ -158,10 +172,10 @@ impl<T: Real, const K: usize> Normal<T, K> {
     }
 
     /// Takes what steps of the detector could do as well from the sums with what is left.
-    fn leave_out(&mut self, Projected { left, columns, scaled, solved }: &Projected<'_, T>) {
+    fn leave_out(&mut self, projected: &Projected<'_, T>) {
+        self.cost += projected.less();
+        let Projected { left, columns, solved, .. } = projected;
         let count = left.len();
-        // `s' s` is `(U'^-1 s)' (U s)`.
-        self.cost += dot(solved, scaled) - dot(left, left) - dot(solved, solved) + T::of(2.0) * dot(left, solved);
         for i in 0..self.count {
             let column = &columns[i * count..(i + 1) * count];
             self.pull[i] -= dot(column, left) - dot(column, solved);
@@ -216,6 +230,17 @@ impl<T: Real, const K: usize> Normal<T, K> {
             let (i, ln_radius) = (PARAMETERS * k + 3, one.spot.ln_radius);
             self.pull[i] -= weight * ln_radius;
             self.known += weight * ln_radius * ln_radius;
+        }
+    }
+
+    /// Weighs what was known of radii anew: from one standard deviation of their logarithms to another.
+    pub fn weigh_radii(&mut self, circuit: &Circuit<T, K>, [from, to]: [T; 2]) {
+        let [from, to] = [from, to].map(|deviation| T::ONE / (deviation * deviation));
+        self.known *= to / from;
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            let i = PARAMETERS * k + 3;
+            self.matrix[i][i] += to - from;
+            self.pull[i] -= (to - from) * one.spot.ln_radius;
         }
     }
 

@@ -28,6 +28,8 @@ pub(crate) struct Patterns<'a, T, const K: usize> {
     there_v: &'a [T],
     /// Weights of the coefficients over distances in the field between a contact and one before it.
     by_ways: [[[T; MAX_KNOTS]; K]; K],
+    /// Fields of the electrodes at each contact, with one more that is the same everywhere.
+    bases: [[T; MAX_ELECTRODES + 1]; K],
 }
 
 impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
@@ -53,7 +55,11 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
                 *weights = table.by_ways(one.spot.at_m, other.spot.at_m);
             }
         }
-        Self { detector, unknown, circuit, fields, there_v, by_ways }
+        let mut bases = [[T::ONE; MAX_ELECTRODES + 1]; K];
+        for (base, one) in bases.iter_mut().zip(&circuit.loaded).take(circuit.count) {
+            base[..n].copy_from_slice(&one.sample.value[..n]);
+        }
+        Self { detector, unknown, circuit, fields, there_v, by_ways, bases }
     }
 
     /// Changes of all readings (V) by one deviation in each direction: a row of readings for each; `gains` is room for so many.
@@ -177,19 +183,19 @@ impl<'a, T: Real, const K: usize> Patterns<'a, T, K> {
         let distances = &self.unknown.distances_ohm[which * table.knots()..(which + 1) * table.knots()];
         let mut ohm: T = distances.iter().zip(&self.by_ways[k][l]).map(|(ohm, weight)| *weight * T::of(*ohm)).sum();
         let walls = &self.unknown.walls[which * pairs(n + 1)..(which + 1) * pairs(n + 1)];
-        let [here, there] = [one, other].map(|one| &one.sample.value);
-        let at = |values: &[T], index: usize| if index < n { values[index] } else { T::ONE };
+        let [here, there] = [k, l].map(|k| &self.bases[k]);
         let mut rest = walls;
         for row in 0..=n {
             let (triangle, after) = rest.split_at(row + 1);
             rest = after;
             let (mut of_here, mut of_there) = (T::ZERO, T::ZERO);
-            for (index, q) in triangle.iter().enumerate() {
-                let half = if index == row { T::of(0.5) * T::of(*q) } else { T::of(*q) };
-                of_here += half * at(here, index);
-                of_there += half * at(there, index);
+            for ((q, here), there) in triangle.iter().zip(here).zip(there) {
+                let q = T::of(*q);
+                of_here += q * *here;
+                of_there += q * *there;
             }
-            ohm += at(there, row) * of_here + at(here, row) * of_there;
+            // Once, what is on the diagonal.
+            ohm += there[row] * of_here + here[row] * (of_there - T::of(triangle[row]) * there[row]);
         }
         for e in 0..n {
             ohm += fields[k].value[e] * other.walls_ohm[e] + fields[l].value[e] * one.walls_ohm[e];

@@ -49,21 +49,39 @@ pub(crate) fn add<T: Real>(to: &mut [T], share: T, row: &[T]) {
     to.iter_mut().zip(row).for_each(|(to, value)| *to += share * *value);
 }
 
+/// Rows that are taken off those below at once.
+const PANEL: usize = 4;
+
 /// Makes the upper triangle of `I + p p'`, whose rows are of so many numbers, to that of `U` with `U' U` for it; `None` if rounding has the say.
 #[inline(always)]
 pub(crate) fn factorise<T: Real>(matrix: &mut [T], count: usize) -> Option<()> {
-    for i in 0..count {
-        let (row, below) = matrix[i * count..].split_at_mut(count);
-        let square = row[i];
-        // One at least, but for rounding.
-        if !(square > T::of(0.5) && square.is_finite()) {
-            return None;
+    for first in (0..count).step_by(PANEL) {
+        let end = (first + PANEL).min(count);
+        let (before, below) = matrix.split_at_mut(end * count);
+        let panel = &mut before[first * count..];
+        for i in first..end {
+            let (rows, rest) = panel.split_at_mut((i + 1 - first) * count);
+            let row = &mut rows[(i - first) * count..];
+            let square = row[i];
+            // One at least, but for rounding.
+            if !(square > T::of(0.5) && square.is_finite()) {
+                return None;
+            }
+            let scale = T::ONE / square.sqrt();
+            row[i..].iter_mut().for_each(|value| *value *= scale);
+            for (j, other) in rest.chunks_exact_mut(count).enumerate() {
+                let j = i + 1 + j;
+                add(&mut other[j..], -row[j], &row[j..]);
+            }
         }
-        let scale = T::ONE / square.sqrt();
-        row[i..].iter_mut().for_each(|value| *value *= scale);
         for (j, other) in below.chunks_exact_mut(count).enumerate() {
-            let j = i + 1 + j;
-            add(&mut other[j..], -row[j], &row[j..]);
+            let j = end + j;
+            // There is something below a whole panel only.
+            let [a, b, c, d] = core::array::from_fn(|k| &panel[k * count + j..(k + 1) * count]);
+            let shares = [a[0], b[0], c[0], d[0]];
+            for ((((value, a), b), c), d) in other[j..].iter_mut().zip(a).zip(b).zip(c).zip(d) {
+                *value -= shares[0] * *a + shares[1] * *b + shares[2] * *c + shares[3] * *d;
+            }
         }
     }
     Some(())

@@ -1,8 +1,10 @@
 //! Derivatives of readings by the parameters of contacts.
 
-use crate::circuit::{Circuit, Loaded, TURNED};
+use crate::circuit::{Circuit, Loaded, PerElectrode, TURNED};
 use crate::head::Head;
+use crate::lanes::at_once;
 use crate::real::Real;
+use crate::table::MAX_ELECTRODES;
 use crate::vector::{PARAMETERS, Vector};
 
 /// What the derivatives by a contact's parameters need of an electrode: numbers that are linear in the electrodes, so that a sum over these will do too.
@@ -26,6 +28,7 @@ impl<T: Real> Pattern<T> {
     };
 
     /// Of a contact, summed over electrodes by `sum`.
+    #[inline(always)]
     pub fn of(one: &Loaded<T>, unit_m: T, sum: impl Fn(&[T]) -> T) -> Self {
         let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| unit_m * sum(slopes));
         Self {
@@ -47,6 +50,7 @@ impl<T: Real> Pattern<T> {
     }
 
     /// Derivatives of the impedance between two electrodes by the parameters (ohm): linear in each of both.
+    #[inline(always)]
     pub fn changes_ohm(&self, other: &Self, one: &Loaded<T>) -> [T; PARAMETERS] {
         let both = |a: T, of_a: T, b: T, of_b: T| a * of_b + b * of_a;
         let moved = |p: usize| both(self.along[p], self.current, other.along[p], other.current);
@@ -88,17 +92,38 @@ impl<T: Real, const K: usize> RowSlopes<T, K> {
         all
     }
 
-    /// Derivatives of an electrode's reading, which is so many volts there, by the parameters (V).
-    pub fn of_reading(&self, circuit: &Circuit<T, K>, head: &Head, e: usize, volts: T) -> Vector<T, K> {
-        let of_load = T::ONE - volts / T::of(head.drive_v);
-        let mut slope = Vector::ZERO;
-        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
-            let pattern = Pattern::of(one, T::of(head.radius_m), |values| values[e]);
-            let changes_ohm = pattern.changes_ohm(&self.own[k], one);
-            for (i, change_ohm) in changes_ohm.into_iter().enumerate() {
-                slope.0[k][i] = self.per_ohm * (change_ohm - of_load * self.own_ohm.0[k][i]);
+    /// Derivatives of the row's readings, which are so many volts there, by all parameters (V).
+    pub fn of_readings(&self, circuit: &Circuit<T, K>, head: &Head, there_v: &[T], slopes: &mut Slopes<T, K>) {
+        at_once(
+            #[inline(always)]
+            || {
+                for (k, slopes) in slopes.iter_mut().enumerate().take(circuit.count) {
+                    self.of_contact(&circuit.loaded[k], k, head, there_v, slopes);
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn of_contact(
+        &self,
+        one: &Loaded<T>,
+        k: usize,
+        head: &Head,
+        there_v: &[T],
+        slopes: &mut [PerElectrode<T>; PARAMETERS],
+    ) {
+        let (unit_m, per_v) = (T::of(head.radius_m), T::ONE / T::of(head.drive_v));
+        let (own, own_ohm) = (&self.own[k], &self.own_ohm.0[k]);
+        for (e, there_v) in there_v.iter().enumerate().take(MAX_ELECTRODES) {
+            let of_load = T::ONE - per_v * *there_v;
+            let changes_ohm = Pattern::of(one, unit_m, |values| values[e]).changes_ohm(own, one);
+            for p in 0..PARAMETERS {
+                slopes[p][e] = self.per_ohm * (changes_ohm[p] - of_load * own_ohm[p]);
             }
         }
-        slope
     }
 }
+
+/// Derivatives of a row's readings: of each contact by each parameter.
+pub(crate) type Slopes<T, const K: usize> = [[PerElectrode<T>; PARAMETERS]; K];

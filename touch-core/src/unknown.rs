@@ -10,7 +10,7 @@ use core::ops::Range;
 use crate::fields::{Sample, Stencil};
 use crate::lanes::at_once;
 use crate::products::add;
-use crate::real::Real;
+use crate::real::{Real, rough_ln};
 use crate::spline::{interval, weights};
 use crate::table::{MAX_ELECTRODES, MAX_KNOTS, Table};
 use crate::ways::{turned_ways_m, ways_m};
@@ -333,7 +333,9 @@ impl<'a, T: Real> Detector<'a, T> {
     /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives; second ones as far as `bent` says.
     pub fn sample(&self, at_m: [T; 2], wide: T, bent: T, sample: &mut Sample<T>) {
         self.table.sample(at_m, wide, bent, sample);
-        if let Some((unknown, moved)) = &self.moved {
+        if let Some((unknown, moved)) = &self.moved
+            && unknown.tables > 0
+        {
             unknown.add(self.table, moved.shares, at_m, sample);
         }
     }
@@ -365,14 +367,28 @@ impl<'a, T: Real> Detector<'a, T> {
             .map_or(T::ONE, |(unknown, moved)| moved.gains[e] + moved.bows_v[e] * unknown.bow(e, volts)[1])
     }
 
-    /// The value alone (ohm) of [that part](Self::by_ways_ohm) of the field between two places: what a look at one more contact needs.
-    pub fn value_by_ways_ohm(&self, to_m: [T; 2], from_m: [T; 2]) -> T {
-        let far_m = |[x_m, y_m]: [T; 2]| (x_m * x_m + y_m * y_m).sqrt().max(T::of(1e-9));
-        ways_m(to_m, from_m, self.table.walls_m()).map(|way_m| self.by_distance_ohm(far_m(way_m)).0).sum()
+    /// The value alone (ohm) of [that part](Self::by_ways_ohm) of the field between two places, roughly: what a look at one more contact needs.
+    #[inline(always)]
+    pub fn rough_by_ways_ohm(&self, to_m: [T; 2], from_m: [T; 2]) -> T {
+        let head = self.table.head();
+        let (per_near_m2, per_step) = (1.0 / (head.near_m * head.near_m), 0.5 / head.ln_step);
+        let of_way = |[x_m, y_m]: [T; 2]| {
+            let square = per_near_m2 * (x_m * x_m + y_m * y_m).to_f32().unwrap_or(0.0);
+            let (first, t) = interval(per_step * rough_ln(square.max(1.0)), self.table.knots() - 3);
+            let weights = weights(t).value;
+            (0..4).map(|k| T::of(weights[k]) * self.distance_ohm(first + k)).sum::<T>()
+        };
+        ways_m(to_m, from_m, self.table.walls_m()).map(of_way).sum()
+    }
+
+    /// A coefficient over distances (ohm).
+    fn distance_ohm(&self, knot: usize) -> T {
+        self.moved.as_ref().map_or_else(|| T::of(self.table.distance_ohm(knot)), |(_, moved)| moved.distances_ohm[knot])
     }
 
     /// The part of the field between two places that goes by the ways between them: its value (ohm), its derivatives by each of both (ohm/m), and the bends there (ohm/m2):
     /// half of that along x less that along y, and that along both.
+    #[inline(always)]
     pub fn by_ways_ohm(&self, to_m: [T; 2], from_m: [T; 2]) -> (T, [[T; 2]; 2], [[T; 2]; 2]) {
         let (mut ohm, mut slopes, mut bends) = (T::ZERO, [[T::ZERO; 2]; 2], [[T::ZERO; 2]; 2]);
         for (way_m, turns) in turned_ways_m(to_m, from_m, self.table.walls_m()) {
@@ -397,16 +413,15 @@ impl<'a, T: Real> Detector<'a, T> {
     }
 
     /// What a way adds to that by its length (m): its value (ohm), and its first and second derivatives by that (ohm/m, ohm/m2).
+    #[inline(always)]
     pub(crate) fn by_distance_ohm(&self, distance_m: T) -> (T, T, T) {
-        let at = |k: usize| {
-            self.moved.as_ref().map_or_else(|| T::of(self.table.distance_ohm(k)), |(_, moved)| moved.distances_ohm[k])
-        };
         let knots = Knots::of(self.table, distance_m);
-        let sum = |weights: &[T; 4]| (0..4).map(|k| weights[k] * at(knots.first + k)).sum::<T>();
+        let sum = |weights: &[T; 4]| (0..4).map(|k| weights[k] * self.distance_ohm(knots.first + k)).sum::<T>();
         (sum(&knots.value), sum(&knots.slope), sum(&knots.bend))
     }
 
     /// `Q b` of the fields at a place.
+    #[inline(always)]
     pub fn by_walls(&self, fields_ohm: &[T], products: &mut [T; MAX_ELECTRODES + 1]) {
         match &self.moved {
             Some((_, moved)) => walled(|a, b| of_pair(moved.walls, a, b), fields_ohm, products),
@@ -416,6 +431,7 @@ impl<'a, T: Real> Detector<'a, T> {
 }
 
 /// `Q b` of the fields at a place.
+#[inline(always)]
 fn walled<T: Real>(walls: impl Fn(usize, usize) -> T, fields_ohm: &[T], products: &mut [T; MAX_ELECTRODES + 1]) {
     let n = fields_ohm.len();
     for (row, product) in products.iter_mut().enumerate().take(n + 1) {
@@ -448,6 +464,7 @@ struct Knots<T> {
 
 impl<T: Real> Knots<T> {
     /// At a distance (m).
+    #[inline(always)]
     fn of(table: &Table<'_>, distance_m: T) -> Self {
         let [near_m, ln_step] = [table.head.near_m, table.head.ln_step].map(T::of);
         // Nearer than that there is no second contact.

@@ -189,8 +189,12 @@ fn the_sum_of_squares_is_that_of_the_posteriors_mean() {
             with_held(unknown, &table, |held| {
                 let mut circuit = Circuit::<f64, 3>::EMPTY;
                 assert!(circuit.solve(detector, spots));
-                let kept: Kept<DIRECTIONS> = held.hold(detector, unknown, &circuit, noise_v, 1.0, |_, _| true).unwrap();
+                held.read(detector, &circuit);
+                // Whether they are held in it, or were in another noise.
+                let kept: Kept<DIRECTIONS> = held.hold(detector, unknown, &circuit, [3.0 * noise_v, 1.0], |_, _| true);
                 assert_eq!(kept.count, DIRECTIONS);
+                held.rescale(kept.count, 1.0 / 3.0);
+                held.factorise(kept.count, 1.0).unwrap();
                 held.set_state(&kept, &at);
                 let mut normal = Normal::EMPTY;
                 normal.sum_up_held(detector, &circuit, &frame, noise_v, f64::from(ANY_RADIUS), (held, kept.count));
