@@ -62,8 +62,21 @@ impl<T: Real> Room<'_, T> {
             });
         let (shares, fields) = self.floats.split_at_mut(unknown.tables);
         let fields = &mut fields[..contacts * unknown.of_place(table.electrodes())];
-        let held =
-            Held { fields, there_v, patterns, scaled, solved, factor, squares, products, taken, columns, slopes, left, read_v };
+        let held = Held {
+            fields,
+            there_v,
+            patterns,
+            scaled,
+            solved,
+            factor,
+            squares,
+            products,
+            taken,
+            columns,
+            slopes,
+            left,
+            read_v,
+        };
         Parts { moved, shares, held }
     }
 }

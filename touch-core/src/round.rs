@@ -153,7 +153,9 @@ impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
         let Task { table, frame, .. } = self.task;
         let full_v = T::of(table.head().full_v);
         let per_v = T::ONE / noise_v;
-        self.parts.held.leave(|index, read_v| left_v(frame, index, full_v, read_v).map_or(T::ZERO, |left_v| per_v * left_v));
+        self.parts
+            .held
+            .leave(|index, read_v| left_v(frame, index, full_v, read_v).map_or(T::ZERO, |left_v| per_v * left_v));
     }
 
     /// Squares of what a scene leaves of the readings, in noise.
@@ -309,7 +311,12 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     /// Steps contacts with the detector's patterns held, and takes it to its posterior's mean; `None` if that is not worth it.
-    fn step_contacts(&mut self, on: &mut On<'_, '_, T, K>, before: T, work: &mut Working<'_, K>) -> Option<Scene<T, K, D>> {
+    fn step_contacts(
+        &mut self,
+        on: &mut On<'_, '_, T, K>,
+        before: T,
+        work: &mut Working<'_, K>,
+    ) -> Option<Scene<T, K, D>> {
         let (table, worth) = (on.task.table, self.worth_in_noise());
         let (mut at, mut least) = (self.scene, self.normal.objective());
         for inner in 0..INNER.min(self.steps) {

@@ -113,6 +113,8 @@ pub struct Solver<T = f32, const K: usize = BOARD_CONTACTS, const D: usize = 0> 
     was_lost: bool,
     /// Whether one is waited for that is not explained either.
     is_patient: bool,
+    /// Whether the frame is to be searched, whatever explains it.
+    is_begun: bool,
     /// Most contacts that are looked for.
     most: usize,
     /// What was followed with a contact that the readings hardly speak for, and whether that stays.
@@ -166,6 +168,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             wait: 0,
             was_lost: true,
             is_patient,
+            is_begun: false,
             most: K,
             doubted: None,
             stays: false,
@@ -180,6 +183,13 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     /// Looks for so many contacts at most, of the `K` that there may be.
     pub fn limit(&mut self, most: usize) {
         self.most = most.clamp(1, K);
+    }
+
+    /// Forgets the frames before, and looks in the next one for what explains it from these contacts, whether or not they do.
+    pub fn begin_from(&mut self, contacts: &[Contact<T>], table: &Table<'_>) {
+        self.reset();
+        self.scene = contacts.iter().fold(Scene::EMPTY, |scene, contact| scene.with(Spot::of(contact, table)));
+        self.is_begun = true;
     }
 
     /// The contacts of a frame.
@@ -441,7 +451,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         };
         self.search.more &= found.is_some();
         let may_search = !self.is_patient || self.was_lost && self.may_search();
-        if is_lost && may_search {
+        if core::mem::take(&mut self.is_begun) || is_lost && may_search {
             (self.stage, self.pieces) = (Stage::Searched, 0);
             let wants = self.search.begin(
                 found,

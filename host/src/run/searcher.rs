@@ -1,6 +1,8 @@
 //! The thread that searches: thorough answers, always on the newest frame that the follower had when it was free.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -21,7 +23,7 @@ enum Job {
     /// To search with another solver's half from now on.
     Solver(Option<Box<dyn Search>>),
     /// To search what explains readings.
-    Search { epoch: u64, from: Hypothesis, readings: Readings },
+    Search { epoch: u64, from: Hypothesis, readings: Readings, is_past: Arc<AtomicBool> },
 }
 
 /// The searching thread, seen from the follower: it does one thing at a time. It ends by itself once this is dropped, and nobody waits for what it still
@@ -29,6 +31,10 @@ enum Job {
 pub(super) struct SearchThread {
     jobs: Sender<Job>,
     is_busy: bool,
+    /// What the solution of the last frame leaves, and that of the one that is searched; whether it is so much more that the latter is past.
+    residual: f64,
+    searched: f64,
+    is_past: Arc<AtomicBool>,
     /// Counts what makes running searches useless: another solver, a jump.
     epoch: u64,
     pause: SearchPause,
@@ -49,7 +55,8 @@ impl SearchThread {
     pub fn start(inbox: Arc<Inbox>) -> std::io::Result<Self> {
         let (jobs, queue) = channel();
         thread::Builder::new().name("searcher".to_owned()).spawn(move || work(&queue, &inbox))?;
-        Ok(Self { jobs, is_busy: false, epoch: 0, pause: SearchPause::default(), is_wanted: false })
+        let (pause, is_past) = (SearchPause::default(), Arc::default());
+        Ok(Self { jobs, is_busy: false, residual: 0.0, searched: 0.0, is_past, epoch: 0, pause, is_wanted: false })
     }
 
     /// Searches with this half from now on; what is still searched with another is thrown away.
@@ -69,7 +76,10 @@ impl SearchThread {
     pub fn consider(&mut self, search: bool, solution: &Solution, readings: &Readings, tracker: &dyn Tracker) {
         self.is_wanted = search;
         let is_time = self.pause.is_over(solution, Instant::now()) || tracker.has_news();
-        if search && !self.is_busy && is_time {
+        self.residual = solution.residual.unwrap_or_default();
+        if self.is_busy && self.residual > JUMP * self.searched {
+            self.is_past.store(true, Ordering::Relaxed);
+        } else if search && !self.is_busy && is_time {
             self.search(tracker.hypothesis(), readings.clone());
         }
     }
@@ -94,7 +104,9 @@ impl SearchThread {
     }
 
     fn search(&mut self, from: Hypothesis, readings: Readings) {
-        self.is_busy = self.send(Job::Search { epoch: self.epoch, from, readings });
+        (self.searched, self.is_past) = (self.residual, Arc::default());
+        let is_past = Arc::clone(&self.is_past);
+        self.is_busy = self.send(Job::Search { epoch: self.epoch, from, readings, is_past });
     }
 
     /// Whether the thread takes it.
@@ -130,8 +142,11 @@ fn work(jobs: &Receiver<Job>, inbox: &Inbox) {
         }
         match job {
             Job::Solver(next) => half = next,
-            Job::Search { epoch, from, readings } => {
-                let mut better = |lead| inbox.put(Event::Searched(Searched { epoch, lead, is_last: false }));
+            Job::Search { epoch, from, readings, is_past } => {
+                let mut better = |lead| {
+                    inbox.put(Event::Searched(Searched { epoch, lead, is_last: false }));
+                    if is_past.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                };
                 // Whatever happens, the follower is not left waiting.
                 let search = std::panic::AssertUnwindSafe(|| {
                     half.as_mut().map(|half| half.search(from, &readings, &mut better))

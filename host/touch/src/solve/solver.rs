@@ -4,6 +4,7 @@
 //! has a thread of its own: the tracker answers at the board's rate, and goes on from what a search has found once that explains the present better.
 
 use std::any::Any;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::solve::answer::{FoundContact, Solution, SolveError};
@@ -122,7 +123,7 @@ pub trait Tracker: Send {
 /// Searches what explains a frame.
 pub trait Search: Send {
     /// What explains `readings`, or the mean that `from` has of them and of those before; `from` is what was followed up to now, and
-    /// explains them partly. What is better than nothing on the way there goes to `found`.
+    /// explains them partly. What is better than nothing on the way there goes to `found`, which breaks where nothing better is of use any more.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
@@ -130,7 +131,7 @@ pub trait Search: Send {
         &mut self,
         from: Hypothesis,
         readings: &Readings,
-        found: &mut dyn FnMut(Hypothesis),
+        found: &mut dyn FnMut(Hypothesis) -> ControlFlow<()>,
     ) -> Result<Hypothesis, SolveError>;
 }
 
@@ -184,7 +185,7 @@ pub(crate) fn follow_and_search(
     if !followed.search {
         return Ok(followed.solution);
     }
-    let hypothesis = search.search(tracker.hypothesis(), readings, &mut |_| {})?;
+    let hypothesis = search.search(tracker.hypothesis(), readings, &mut |_| ControlFlow::Continue(()))?;
     Ok(tracker.adopt(hypothesis, readings)?.solution)
 }
 
@@ -199,7 +200,7 @@ pub(crate) fn follow_rows_and_search(
     if !followed.search {
         return Ok(followed.solution);
     }
-    let hypothesis = search.search(tracker.hypothesis(), latest, &mut |_| {})?;
+    let hypothesis = search.search(tracker.hypothesis(), latest, &mut |_| ControlFlow::Continue(()))?;
     Ok(tracker.adopt(hypothesis, latest)?.solution)
 }
 

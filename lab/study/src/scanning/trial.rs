@@ -1,5 +1,6 @@
 //! A solver that follows contacts by the frames of a plan, as they arrive.
 
+use std::ops::ControlFlow;
 use tactomo_physics::baseline::{Baseline, BaselineSum};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
@@ -128,7 +129,7 @@ impl<'a> Bench<'a> {
         self.since_search_s = 0.0;
         let lead = self.parts.tracker.hypothesis();
         let lead = match &mut self.parts.search {
-            Some(searcher) => searcher.search(lead, readings, &mut |_| {})?,
+            Some(searcher) => searcher.search(lead, readings, &mut |_| ControlFlow::Continue(()))?,
             None => lead,
         };
         Ok(self.parts.tracker.adopt(lead, readings)?.solution)

@@ -162,6 +162,8 @@ impl Corrector {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
     use crate::solve::pipeline::fault_tolerant::FaultTolerant;
     use crate::solve::pipeline::method::Method;
@@ -237,7 +239,8 @@ mod tests {
             let Parts { mut tracker, search } = Method::Auto.build(problem).unwrap().split();
             tracker.inherit(before);
             tracker.follow(&readings).unwrap();
-            let hypothesis = search.unwrap().search(tracker.hypothesis(), &readings, &mut |_| {}).unwrap();
+            let hypothesis =
+                search.unwrap().search(tracker.hypothesis(), &readings, &mut |_| ControlFlow::Continue(())).unwrap();
             tracker.adopt(hypothesis, &readings).unwrap().solution.contacts[0]
         };
         assert_corrected(&live(&corrected, &[]), &live(&plain, &[]), "live");

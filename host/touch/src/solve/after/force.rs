@@ -43,6 +43,8 @@ impl Scale {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
     use crate::solve::answer::FoundContact;
     use crate::solve::pipeline::fault_tolerant::FaultTolerant;
@@ -95,7 +97,8 @@ mod tests {
             let Parts { mut tracker, search } = method.build(&problem).unwrap().split();
             let mut followed = tracker.follow(&readings).unwrap();
             if let Some(mut search) = search {
-                let hypothesis = search.search(tracker.hypothesis(), &readings, &mut |_| {}).unwrap();
+                let hypothesis =
+                    search.search(tracker.hypothesis(), &readings, &mut |_| ControlFlow::Continue(())).unwrap();
                 followed = tracker.adopt(hypothesis, &readings).unwrap();
             }
             let [contact] = followed.solution.contacts[..] else { panic!("{}", method.name()) };

@@ -16,6 +16,7 @@ pub(crate) mod unexplained;
 pub(crate) mod without;
 
 use std::borrow::Cow;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use self::unexplained::Unexplained;
@@ -210,7 +211,7 @@ impl Search for Staged<dyn Search> {
         &mut self,
         from: Hypothesis,
         readings: &Readings,
-        found: &mut dyn FnMut(Hypothesis),
+        found: &mut dyn FnMut(Hypothesis) -> ControlFlow<()>,
     ) -> Result<Hypothesis, SolveError> {
         let seen = self.stages.seen(readings)?;
         self.half.search(from, &*self.stages.before(&seen)?, found)

@@ -169,7 +169,7 @@ impl Search for AutoSearch {
         &mut self,
         from: Hypothesis,
         readings: &Readings,
-        found: &mut dyn FnMut(Hypothesis),
+        found: &mut dyn FnMut(Hypothesis) -> ControlFlow<()>,
     ) -> Result<Hypothesis, SolveError> {
         let mut from: FrameHypothesis = from.known();
         let mean = from.mean.take().unwrap_or_else(|| Mean::of_frame(readings));
@@ -186,18 +186,19 @@ impl Search for AutoSearch {
         }
         let contacts = contacts.filter(|_| from.is_none());
         let is_of_key_frames = contacts.as_ref().is_some_and(|contacts| contacts.is_of_key_frames());
-        let mut early = None;
+        let (mut early, mut is_past) = (None, false);
         let mut better = |better: ContactHypothesis| {
             early = self.early(&search, &better, shape_of(from.as_ref()), &mean);
-            // A picture does not change to contacts that may not explain it.
-            if early.is_none() && from.is_none() {
-                found(Hypothesis::of(FrameHypothesis {
-                    contacts: Some(Box::new(better)),
-                    whole: None,
-                    mean: Some(mean.clone()),
-                }));
+            if early.is_some() {
+                return ControlFlow::Break(());
             }
-            if early.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            // A picture does not change to contacts that may not explain it.
+            if from.is_none() {
+                let contacts = Some(Box::new(better));
+                let lead = FrameHypothesis { contacts, whole: None, mean: Some(mean.clone()) };
+                is_past = found(Hypothesis::of(lead)).is_break();
+            }
+            if is_past { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let contacts = search.contacts(contacts.map(|found| *found), &mean, &mut better)?;
         let Some((contacts, solution)) = contacts else {
@@ -206,8 +207,8 @@ impl Search for AutoSearch {
         let target = finder.target_of(&mean, contacts.error())?;
         let whole = match early {
             Some(shape) => Some(Whole::Shape(Box::new(shape))),
-            // Whether they are contacts at all is not asked by every look at more frames of them.
-            None if is_of_key_frames => None,
+            // Whether they are contacts at all is not asked by every look at more frames of them, nor of a frame that is past.
+            None if is_of_key_frames || is_past => None,
             None => self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?,
         };
         let whole = whole.map(|whole| (whole, instead_of(&solution)));

@@ -1,6 +1,7 @@
 //! Tests of the choice between contacts, shapes and images.
 
 use std::f64::consts::FRAC_PI_2;
+use std::ops::ControlFlow;
 
 use super::*;
 use crate::solve::answer::{FoundContact, FoundShape, Solution};
@@ -173,7 +174,7 @@ fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
     let first = trial.measured(&moved(0.0));
     let before = tracker.follow(&first).unwrap();
     assert!(before.search && before.solution.flags.unfinished && before.solution.contacts.is_empty());
-    let hypothesis = search.search(tracker.hypothesis(), &first, &mut |_| {}).unwrap();
+    let hypothesis = search.search(tracker.hypothesis(), &first, &mut |_| ControlFlow::Continue(())).unwrap();
     // The answer comes when the contacts are 3 mm further on.
     let after = tracker.adopt(hypothesis, &trial.measured(&moved(0.003))).unwrap();
     assert_eq!((what(&after.solution), after.search), ("2 contacts", false), "{after:?}");
@@ -202,9 +203,9 @@ fn a_search_of_the_past_does_not_replace_what_explains_the_present() {
     let Parts { mut tracker, search } = Box::new(Auto::new(&trial.problem()).unwrap()).split();
     let mut search = search.unwrap();
     let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
-    let past = search.search(Hypothesis::default(), &trial.measured(&[a]), &mut |_| {}).unwrap();
+    let past = search.search(Hypothesis::default(), &trial.measured(&[a]), &mut |_| ControlFlow::Continue(())).unwrap();
     let present = trial.measured(&[a, b]);
-    let hypothesis = search.search(Hypothesis::default(), &present, &mut |_| {}).unwrap();
+    let hypothesis = search.search(Hypothesis::default(), &present, &mut |_| ControlFlow::Continue(())).unwrap();
     tracker.adopt(hypothesis, &present).unwrap();
     let kept = tracker.adopt(past, &trial.measured(&[a, b])).unwrap();
     assert_eq!(what(&kept.solution), "2 contacts");
@@ -217,8 +218,9 @@ fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
     let mut search = search.unwrap();
     let a = [Contact::flat(0.01, 0.004, 0.0025, 3e-4)];
     let frame = trial.frame();
-    let image = search.search(Hypothesis::default(), &frame, &mut |_| {}).unwrap();
-    let contact = search.search(Hypothesis::default(), &trial.measured(&a), &mut |_| {}).unwrap();
+    let image = search.search(Hypothesis::default(), &frame, &mut |_| ControlFlow::Continue(())).unwrap();
+    let contact =
+        search.search(Hypothesis::default(), &trial.measured(&a), &mut |_| ControlFlow::Continue(())).unwrap();
     tracker.adopt(contact.clone(), &trial.measured(&a)).unwrap();
     let kept = tracker.adopt(image.clone(), &trial.measured(&a)).unwrap();
     assert_eq!(what(&kept.solution), "1 contact");
@@ -273,8 +275,9 @@ fn a_shape_and_contacts_of_the_past_do_not_replace_each_other() {
     let mut search = search.unwrap();
     let pair = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
     let bar = [([0.002, -0.003], Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 }, 1.5)];
-    let line = search.search(Hypothesis::default(), &trial.shaped(&bar), &mut |_| {}).unwrap();
-    let contacts = search.search(Hypothesis::default(), &trial.measured(&pair), &mut |_| {}).unwrap();
+    let line = search.search(Hypothesis::default(), &trial.shaped(&bar), &mut |_| ControlFlow::Continue(())).unwrap();
+    let contacts =
+        search.search(Hypothesis::default(), &trial.measured(&pair), &mut |_| ControlFlow::Continue(())).unwrap();
     tracker.adopt(contacts.clone(), &trial.measured(&pair)).unwrap();
     let kept = tracker.adopt(line.clone(), &trial.measured(&pair)).unwrap();
     assert!(kept.solution.is_contacts() && !kept.search, "{kept:?}");
@@ -300,11 +303,11 @@ fn a_ring_that_has_moved_on_a_detector_as_built_is_found_from_where_it_was() {
     let Parts { mut tracker, search } = Box::new(Auto::new(&Problem::of(&described).unwrap()).unwrap()).split();
     let mut search = search.unwrap();
     let (before, after) = (ring_at(0.008), ring_at(-0.008));
-    let found = search.search(Hypothesis::default(), &before, &mut |_| {}).unwrap();
+    let found = search.search(Hypothesis::default(), &before, &mut |_| ControlFlow::Continue(())).unwrap();
     let followed = tracker.adopt(found, &before).unwrap();
     assert_eq!(what(&followed.solution), "ring");
     assert!(tracker.follow(&after).unwrap().search, "it has gone farther than it is followed");
-    let moved = search.search(tracker.hypothesis(), &after, &mut |_| {}).unwrap();
+    let moved = search.search(tracker.hypothesis(), &after, &mut |_| ControlFlow::Continue(())).unwrap();
     let moved = tracker.adopt(moved, &after).unwrap().solution;
     let Some(FoundShape::Ring(ring)) = &moved.shape else { panic!("{moved:?}") };
     assert!(

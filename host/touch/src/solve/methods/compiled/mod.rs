@@ -59,14 +59,23 @@ impl Compiled {
         Self { core: Box::default(), numbers: vec![0.0; numbers], floats: vec![0.0; floats], detector }
     }
 
-    /// What explains the mean of some frames, whose noise has such a standard deviation (V), by so many contacts at most, whatever was before.
+    /// What explains the mean of some frames, whose noise has such a standard deviation (V), by so many contacts at most: from some that are given, and from nothing.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
-    pub(crate) fn alone(&mut self, readings: &Readings, noise_v: f64, most: usize) -> Result<FoundAlone, SolveError> {
-        self.core.reset();
-        self.core.limit(most);
-        let answer = self.answer(readings, Some(noise_v))?;
+    pub(crate) fn alone(
+        &mut self,
+        readings: &Readings,
+        noise_v: f64,
+        most: usize,
+        from: &[Disc],
+    ) -> Result<FoundAlone, SolveError> {
+        let from: Vec<_> = from.iter().map(core_contact).collect();
+        let answer = self.on_frame(readings, Some(noise_v), |core, table, unknown, room, frame| {
+            core.begin_from(&from, table);
+            core.limit(most);
+            core.solve_unknown(table, unknown, room, frame)
+        })?;
         let disc = |of: &Contact<f64>| Disc::flat(of.x_m, of.y_m, of.radius_m, of.conductance_s);
         Ok(FoundAlone {
             contacts: answer.contacts().iter().map(disc).collect(),

@@ -68,7 +68,7 @@ impl ContactFinder {
         Some(found?.hypothesis)
     }
 
-    /// What explains a frame: what explained the one before, or what the compiled detector finds by itself. What leaves more than noise does is gone on from, contact by
+    /// What explains a frame: what explained the one before, or what the compiled detector finds from there. What leaves more than noise does is gone on from, contact by
     /// contact. What ended the search breaks.
     fn search_anew(
         &self,
@@ -76,16 +76,11 @@ impl ContactFinder {
         target: &Target,
         better: &mut Better<'_>,
     ) -> ControlFlow<Informed, Option<Informed>> {
-        let mut followed = from.and_then(|from| self.caught_up(from, target));
-        if let Some(known) = followed.take_if(|followed| followed.target.error().is_none()) {
-            // There, what is followed seldom leads astray, and bumps that come and go one after the other are told from what was there.
-            let grown = self.grown(known, better)?;
-            if !self.is_misfit(&grown.hypothesis.fit, &grown.target) {
-                return ControlFlow::Continue(Some(grown));
-            }
-            followed = Some(grown);
-        }
-        let Some(alone) = self.found_by_table(target) else { return self.search_by_discs(followed, target, better) };
+        let followed = from.and_then(|from| self.caught_up(from, target));
+        let begun = followed.as_ref().map_or(&[][..], |followed| &followed.hypothesis.fit.contacts);
+        let Some(alone) = self.found_by_table(target, begun) else {
+            return self.search_by_discs(followed, target, better);
+        };
         let Some(best) = self.likelier(followed, alone) else { return ControlFlow::Continue(None) };
         let best = self.or_one_wide(self.without_needless(best));
         told(&best, better)?;
@@ -124,14 +119,14 @@ impl ContactFinder {
         ControlFlow::Continue(self.more_likely(followed, anew))
     }
 
-    /// What the compiled detector finds in a frame by itself, if anything; `None` if there is no table, or not yet, or what is found makes no sense to the model itself.
-    fn found_by_table(&self, target: &Target) -> Option<Option<Informed>> {
+    /// What the compiled detector finds in a frame from contacts and from nothing, if anything; `None` if there is no table, or not yet, or what is found makes no sense to the model itself.
+    fn found_by_table(&self, target: &Target, begun: &[Contact]) -> Option<Option<Informed>> {
         let found = {
             let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
             if compiled.is_none() {
                 *compiled = self.problem.compiled().map(Compiled::on);
             }
-            compiled.as_mut()?.alone(&target.readings(), target.noise_v, self.settings.most).ok()?
+            compiled.as_mut()?.alone(&target.readings(), target.noise_v, self.settings.most, begun).ok()?
         };
         if found.contacts.is_empty() {
             return Some(None);

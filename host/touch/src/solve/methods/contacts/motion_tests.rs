@@ -1,5 +1,6 @@
 //! Contacts in the mean of frames that stand still, and what happens when something moves.
 
+use std::ops::ControlFlow;
 use std::sync::LazyLock;
 
 use super::*;
@@ -156,7 +157,7 @@ fn a_scene_that_stands_still_is_searched_only_when_its_frames_have_doubled() {
         let Followed { search, .. } = tracker.follow(&frame).unwrap();
         if search {
             searched += 1;
-            let hypothesis = searcher.search(tracker.hypothesis(), &frame, &mut |_| ()).unwrap();
+            let hypothesis = searcher.search(tracker.hypothesis(), &frame, &mut |_| ControlFlow::Continue(())).unwrap();
             assert!(!tracker.adopt(hypothesis, &frame).unwrap().search);
         }
     }
@@ -261,7 +262,7 @@ fn grounds_are_chosen_for_what_moves() {
         let frame = trial.frame();
         let Followed { search, .. } = tracker.follow(&frame).unwrap();
         if search {
-            let hypothesis = searcher.search(tracker.hypothesis(), &frame, &mut |_| ()).unwrap();
+            let hypothesis = searcher.search(tracker.hypothesis(), &frame, &mut |_| ControlFlow::Continue(())).unwrap();
             tracker.adopt(hypothesis, &frame).unwrap();
         }
         tracker.telling_grounds(3).map(|grounds| grounds.len())

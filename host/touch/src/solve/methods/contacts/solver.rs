@@ -371,14 +371,11 @@ impl Search for ContactSearch {
         &mut self,
         from: Hypothesis,
         readings: &Readings,
-        found: &mut dyn FnMut(Hypothesis),
+        found: &mut dyn FnMut(Hypothesis) -> ControlFlow<()>,
     ) -> Result<Hypothesis, SolveError> {
         let from: FrameHypothesis = from.known();
         let mean = from.mean.unwrap_or_else(|| Mean::of_frame(readings));
-        let mut better = |better| {
-            found(Hypothesis::of(FrameHypothesis::new(Some(better), Some(mean.clone()))));
-            ControlFlow::Continue(())
-        };
+        let mut better = |better| found(Hypothesis::of(FrameHypothesis::new(Some(better), Some(mean.clone()))));
         let found = self.contacts(from.contacts.map(|found| *found), &mean, &mut better)?.map(|(found, _)| found);
         Ok(Hypothesis::of(FrameHypothesis::new(found, Some(mean))))
     }
