@@ -19,9 +19,10 @@ enum Kind {
     Without,
     AsOne,
     BeyondRidge,
+    WithoutBeyondRidge,
 }
 
-const ALL: [Kind; 3] = [Kind::Without, Kind::AsOne, Kind::BeyondRidge];
+const ALL: [Kind; 4] = [Kind::Without, Kind::AsOne, Kind::BeyondRidge, Kind::WithoutBeyondRidge];
 pub(super) const KINDS: usize = ALL.len();
 
 /// Whether the readings hardly tell one of several contacts.
@@ -68,7 +69,7 @@ fn as_one<T: Real, const K: usize, const D: usize>(scene: &Scene<T, K, D>, which
 
 impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     /// Where the other explanation with this number begins: without a contact that the readings hardly tell; with more than two side by side as one; or with one that readings place
-    /// badly beyond the ridge before the nearest wall.
+    /// badly beyond the ridge before the nearest wall, with all others or without one that may only be there since that one is not.
     pub(super) fn other(&self, kept: &Fit<T, K, D>, number: usize) -> Option<Scene<T, K, D>> {
         let (k, scene) = (number / KINDS, &kept.scene);
         match ALL[number % KINDS] {
@@ -80,6 +81,10 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                 (is_first && all.count_ones() > 2).then(|| as_one(scene, all, usual_m))
             }
             Kind::BeyondRidge => self.is_loose(kept, k).then(|| self.beyond_ridge(scene, k))?,
+            Kind::WithoutBeyondRidge => {
+                let beyond = (0..scene.count).find(|other| *other != k && self.is_loose(kept, *other))?;
+                is_unsure(kept, k, NEEDED).then(|| Some(self.beyond_ridge(scene, beyond)?.without(k)))?
+            }
         }
     }
 
