@@ -6,9 +6,11 @@
 //!
 //! All that is done in pieces, each of which ends soon, so that whoever has something else to do between them can.
 
-use crate::answer::{Answer, Certainty, Contact, Flags};
+mod given;
+
+use crate::answer::{Answer, Certainty, Flags};
 use crate::beside::beside;
-use crate::circuit::{Circuit, Spot};
+use crate::circuit::Circuit;
 use crate::evidence::{freedom, is_misfit, is_nothing, limit, score, weakest};
 use crate::fit::{Bench, Fit, Fitting, Scene, Went, Work, Working};
 use crate::frame::{Errors, Frame, FrameError};
@@ -27,8 +29,6 @@ const WORSE: f32 = 1.3;
 /// Steps at most where contacts are followed, and where one that is gone is left out.
 const FOLLOWING: u8 = 4;
 const LEAVING_OUT: u8 = 20;
-/// Steps at most where contacts are given.
-const TO_THE_END: u8 = 60;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
 const PATIENCE: [u32; 2] = [1, 64];
 
@@ -185,13 +185,6 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         self.most = most.clamp(1, K);
     }
 
-    /// Forgets the frames before, and looks in the next one for what explains it from these contacts, whether or not they do.
-    pub fn begin_from(&mut self, contacts: &[Contact<T>], table: &Table<'_>) {
-        self.reset();
-        self.scene = contacts.iter().fold(Scene::EMPTY, |scene, contact| scene.with(Spot::of(contact, table)));
-        self.is_begun = true;
-    }
-
     /// The contacts of a frame.
     ///
     /// # Errors
@@ -255,45 +248,6 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         }
     }
 
-    /// Twice the logarithm of the evidence for the contacts of the last answer, but for what is the same for all explanations of a frame; `None` if there are none.
-    pub fn answer_evidence(&self) -> Option<T> {
-        self.evidence
-    }
-
-    /// The same for contacts that are fitted to a frame from where some are; `None` if they make no sense. It tells whether an answer explains a frame less well than what is
-    /// there. The frames before are forgotten.
-    ///
-    /// # Errors
-    /// [`FrameError`] if it cannot be a frame of the table's detector.
-    ///
-    /// # Panics
-    /// As [`solve_unknown`](Self::solve_unknown).
-    pub fn evidence(
-        &mut self,
-        table: &Table<'_>,
-        unknown: &Unknown<'_>,
-        room: &mut Room<'_, T>,
-        frame: &Frame<'_, T>,
-        contacts: &[Contact<T>],
-    ) -> Result<Option<T>, FrameError> {
-        frame.check(table)?;
-        self.reset();
-        let (frame, _) = frame.without_broken(table);
-        let mut errors = Errors::of(&frame, table);
-        errors.pads.fill(T::ZERO);
-        self.fitting.on.begin_frame(&mut errors, frame.volts.len());
-        let task = Task { table, frame: &frame, errors: &errors, unknown: Some(unknown) };
-        let scene = contacts.iter().fold(Scene::EMPTY, |scene, contact| scene.with(Spot::of(contact, table)));
-        self.fit(scene, T::of(ANY_RADIUS), TO_THE_END);
-        let mut bench = Bench { circuit: &mut self.circuit, room: Some(room) };
-        let mut work = Working { done: &mut self.work, attend: &mut || {} };
-        loop {
-            if let Went::ToEnd(found) = self.fitting.go_on(task, &mut bench, &mut work) {
-                return Ok(found.map(|fit| fit.evidence));
-            }
-        }
-    }
-
     fn work_on(
         &mut self,
         table: &Table<'_>,
@@ -304,14 +258,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     ) -> Result<Option<Answer<T, K>>, FrameError> {
         frame.check(table)?;
         let (frame, left_out) = frame.without_broken(table);
-        let mut errors = Errors::of(&frame, table);
-        if unknown.is_some() {
-            // Pads are among what is not known.
-            errors.pads.fill(T::ZERO);
-        }
-        if self.stage == Stage::Idle {
-            self.fitting.on.begin_frame(&mut errors, frame.volts.len());
-        }
+        let errors = self.errors_of(&frame, table, unknown.is_some());
         let task = Task { table, frame: &frame, errors: &errors, unknown };
         if self.stage == Stage::Idle {
             (self.stage, self.work) = (Stage::Followed, Work::NONE);
@@ -325,6 +272,19 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             answer.flags.raise(Flags::FAULT, left_out != 0);
             answer
         }))
+    }
+
+    /// What is known of a frame's errors. Where one begins, it is found whether patterns are held on.
+    fn errors_of(&mut self, frame: &Frame<'_, T>, table: &Table<'_>, is_unknown: bool) -> Errors<T> {
+        let mut errors = Errors::of(frame, table);
+        if is_unknown {
+            // Pads are among what is not known.
+            errors.pads.fill(T::ZERO);
+        }
+        if self.stage == Stage::Idle {
+            self.fitting.on.begin_frame(&mut errors, frame.volts.len());
+        }
+        errors
     }
 
     /// Does a piece of work.

@@ -61,15 +61,20 @@ impl SearchThread {
 
     /// Searches with this half from now on; what is still searched with another is thrown away.
     pub fn change_solver(&mut self, half: Option<Box<dyn Search>>) {
-        self.epoch += 1;
+        self.throw_away();
         self.pause = SearchPause::default();
         self.send(Job::Solver(half));
     }
 
     /// Throws away what is being searched, and what was to be.
     pub fn forget(&mut self) {
-        self.epoch += 1;
+        self.throw_away();
         self.is_wanted = false;
+    }
+
+    fn throw_away(&mut self) {
+        self.epoch += 1;
+        self.is_past.store(true, Ordering::Relaxed);
     }
 
     /// Searches something better than a solution of these readings, if that may be there (`search`), and the pause is over or there are news.
@@ -233,5 +238,44 @@ mod tests {
         assert!(search.receive(searched).is_some());
         search.catch_up(&readings, &Nothing);
         assert!(search.is_busy && !search.is_wanted, "what was wanted when nothing comes");
+    }
+
+    /// Finds something as long as that is of use.
+    struct Endless;
+
+    impl Search for Endless {
+        fn search(
+            &mut self,
+            from: Hypothesis,
+            _readings: &Readings,
+            found: &mut dyn FnMut(Hypothesis) -> ControlFlow<()>,
+        ) -> Result<Hypothesis, SolveError> {
+            while found(Hypothesis::default()).is_continue() {
+                thread::sleep(Duration::from_millis(1));
+            }
+            Ok(from)
+        }
+    }
+
+    #[test]
+    fn a_search_ends_once_much_more_has_come_than_its_frame_has() {
+        let inbox = Arc::new(Inbox::new(false));
+        let mut search = SearchThread::start(Arc::clone(&inbox)).unwrap();
+        search.change_solver(Some(Box::new(Endless)));
+        let readings = Readings::from_fn(4, |_, _| 0.1);
+        let next = || match inbox.take(Duration::from_secs(60), true) {
+            Event::Searched(searched) => searched,
+            _ => panic!("nothing is found"),
+        };
+        search.consider(true, &leaving(1.0), &readings, &Nothing);
+        search.consider(true, &leaving(1.2), &readings, &Nothing);
+        assert!(!search.is_past.load(Ordering::Relaxed) && !next().is_last);
+        search.consider(true, &leaving(1.4), &readings, &Nothing);
+        let last = std::iter::repeat_with(next).find(|searched| searched.is_last).unwrap();
+        assert!(search.receive(last).is_some() && !search.is_busy);
+        search.consider(true, &leaving(1.4), &readings, &Nothing);
+        assert!(search.is_busy && !search.is_past.load(Ordering::Relaxed), "another frame");
+        search.forget();
+        assert!(std::iter::repeat_with(next).any(|searched| searched.is_last));
     }
 }
