@@ -1,0 +1,67 @@
+//! A frame of a detector that is not known, and where it is worked out.
+
+use crate::circuit::Circuit;
+use crate::fit::Scene;
+use crate::frame::left_v;
+use crate::held::{Held, Parts};
+use crate::real::Real;
+use crate::solver::Task;
+use crate::unknown::{Detector, Layout, Unknown};
+
+/// What rounds are gone with.
+pub(crate) struct On<'a, 't, T, const K: usize> {
+    pub task: Task<'t, T>,
+    pub unknown: &'t Unknown<'t>,
+    pub circuit: &'a mut Circuit<T, K>,
+    pub parts: Parts<'a, T>,
+    /// Whether the detector stays as it was worked out last.
+    pub is_moved: bool,
+}
+
+impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
+    /// The detector, circuit and readings as they were worked out last.
+    pub fn there(&mut self) -> (Detector<'_, T>, &mut Circuit<T, K>, &mut Held<'a, T>) {
+        let table = self.task.table;
+        let Parts { moved, shares, held } = &mut self.parts;
+        let moved = Layout::of(table, self.unknown).as_moved(moved, shares);
+        (Detector { table, moved: Some((self.unknown, moved)) }, &mut *self.circuit, held)
+    }
+
+    /// Solves a scene on its detector and notes what is there to be read, and what channels make of it; `false` if it makes no sense.
+    pub fn read<const D: usize>(&mut self, scene: &Scene<T, K, D>) -> bool {
+        let table = self.task.table;
+        if !self.is_moved {
+            let Parts { moved, shares, .. } = &mut self.parts;
+            Layout::of(table, self.unknown).moved(table, self.unknown, &scene.steps, moved, shares);
+        }
+        let (detector, circuit, held) = self.there();
+        if !circuit.solve(&detector, scene.spots()) {
+            return false;
+        }
+        held.read(&detector, circuit);
+        true
+    }
+
+    /// Notes what is left of the readings, in so much noise (V).
+    pub fn leave(&mut self, noise_v: T) {
+        let Task { table, frame, .. } = self.task;
+        let full_v = T::of(table.head().full_v);
+        let per_v = T::ONE / noise_v;
+        self.parts
+            .held
+            .leave(|index, read_v| left_v(frame, index, full_v, read_v).map_or(T::ZERO, |left_v| per_v * left_v));
+    }
+
+    /// Squares of what a scene leaves of the readings, in noise.
+    pub fn left<const D: usize>(&mut self, scene: &Scene<T, K, D>) -> Option<T> {
+        if !self.read(scene) {
+            return None;
+        }
+        let Task { table, frame, errors, .. } = self.task;
+        let full_v = T::of(table.head().full_v);
+        let all = self.parts.held.read_v().iter().enumerate();
+        let left_v = all.filter_map(|(index, read_v)| left_v(frame, index, full_v, *read_v));
+        let sum: T = left_v.map(|left_v| left_v * left_v).sum();
+        Some(sum / errors.variance_v2).filter(|sum| sum.is_finite())
+    }
+}
