@@ -25,14 +25,14 @@ fn detector() -> Detector {
 
 /// How many times larger errors may be live. In some scenes contacts come while a search for those before still runs, and until it is done places are
 /// of too few contacts; offline, time stands still meanwhile. Measured within the first second: 0.21 to 0.50 mm for 0.08 to 0.18 mm (bumps
-/// that come at 12 Hz), 2.8 to 7.0 mm for 0.9 to 1.9 mm (six contacts in 0.3 s, seven runs), as many contacts as there are in 78 to 89 % for 85 to
-/// 92 %; 0.13 to 0.27 mm for 0.13 mm (the fifth finger, which is told 0.05 to 0.1 s later), counted right in 86 to 100 % for 100 %.
+/// that come at 12 Hz), 0.9 to 1.5 mm for 0.5 to 1.3 mm (six contacts in 0.3 s, six runs), as many contacts as there are in 71 to 83 % for 77 to
+/// 95 %; 0.13 to 0.27 mm for 0.13 mm (the fifth finger, which is told 0.05 to 0.1 s later), counted right in 86 to 100 % for 100 %.
 fn times_behind(scene: SceneName) -> f64 {
     if matches!(scene, SceneName::Texture | SceneName::Hand | SceneName::FiveFingers) { 6.0 } else { 1.0 }
 }
 
 /// How often a scene is run before live counts as worse: another process may take the cores for most of a run. With two busy loops beside it, `hand`
-/// was worse in two runs of six; without, in none of eight.
+/// was worse in two runs of six.
 const TRIES: usize = 3;
 
 /// Runs a solver on a scene both ways; whether live is as good as offline.

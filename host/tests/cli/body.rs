@@ -4,7 +4,7 @@ use tactomo_tests::{Folder, TACTOMO};
 
 /// Names of the patches that a body's detectors were told by, in their order, and how it ended.
 fn patches_of(body: &str) -> (Vec<String>, Option<i32>, String) {
-    let output = TACTOMO.run(&["live", "--body", body, "--seconds", "0.5", "--json"]);
+    let output = TACTOMO.run(&["live", "--body", body, "--seconds", "1", "--json"]);
     let text = String::from_utf8(output.stdout).unwrap();
     let of = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap();
     let told = text.lines().map(of).filter(|line| line["frames"].as_u64() > Some(50));
