@@ -36,7 +36,8 @@ def test_a_data_set_has_the_presses_of_its_recordings(recording):
     solver = tactomo.Solver("contacts", tactomo.Recording(recording).detector)
     for features, place_m in (dataset[index] for index in range(0, 18, 3)):
         readings = (features[:256] * np.exp(features[256])).astype(float)
-        (contact,) = solver.solve_many([readings])[0].contacts
+        # The board's floor, which features do not tell, may be taken for a faint one besides.
+        contact = max(solver.solve_many([readings])[0].contacts, key=lambda contact: contact.conductance_s)
         assert [contact.x_m, contact.y_m] == pytest.approx(place_m, abs=1e-3)
 
 
