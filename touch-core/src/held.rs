@@ -11,6 +11,7 @@
 //! however far the detector is from its description.
 
 use crate::circuit::Circuit;
+use crate::frame::{Frame, left_v};
 use crate::lanes::at_once;
 use crate::patterns::Patterns;
 use crate::products::{add, backward, dot, factorise, forward};
@@ -264,10 +265,11 @@ impl<T: Real> Held<'_, T> {
         self.read_v
     }
 
-    /// Notes what that leaves of a frame, in noise.
-    pub fn leave(&mut self, left: impl Fn(usize, T) -> T) {
-        let all = self.left.iter_mut().zip(&*self.read_v).enumerate();
-        all.for_each(|(index, (to, read_v))| *to = left(index, *read_v));
+    /// Notes what that leaves of a frame in so much noise (V); nothing, where a reading says nothing.
+    pub fn leave(&mut self, frame: &Frame<'_, T>, full_v: T, noise_v: T) {
+        for (index, (left, read_v)) in self.left.iter_mut().zip(&*self.read_v).enumerate() {
+            *left = left_v(frame, index, full_v, *read_v).map_or(T::ZERO, |left_v| left_v / noise_v);
+        }
     }
 
     /// Squares of what is left, at least, with those of the steps of the detector that leave it.

@@ -10,6 +10,7 @@ use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, Working};
 use crate::normal::Normal;
 use crate::real::Real;
 use crate::round::{NEAR, On};
+use crate::solver::Task;
 
 /// Steps at most: where so many do not end, full fits with damping take over.
 const STEPS: usize = 3;
@@ -64,8 +65,9 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// Sums up what the contacts that were read last leave of a frame.
     fn leave(&self, on: &mut On<'_, '_, T, K>, normal: &mut Normal<T, K>) {
-        on.leave(on.task.errors.variance_v2.sqrt());
+        let Task { table, frame, errors, .. } = on.task;
         let held = &mut on.parts.held;
+        held.leave(frame, T::of(table.head().full_v), errors.variance_v2.sqrt());
         normal.sum_up_left(on.circuit, self.radius_deviation, (held, self.on.kept.count));
     }
 }

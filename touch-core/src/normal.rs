@@ -138,9 +138,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
                 }
             }
         }
-        held.leave(|index, read_v| {
-            left_v(frame, index, T::of(head.full_v), read_v).map_or(T::ZERO, |left_v| left_v / noise_v)
-        });
+        held.leave(frame, T::of(head.full_v), noise_v);
         held.project(count, self.count);
         self.cost = dot(held.left(), held.left());
         held.products(self.count, |i, j, product| self.matrix[i][j] = product, |i, product| self.pull[i] = product);

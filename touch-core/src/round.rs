@@ -103,8 +103,8 @@ impl<T: Real, const D: usize> OnUnknown<T, D> {
         let full_v = T::of(table.head().full_v);
         let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
         self.kept = held.hold(detector, unknown?, circuit, [self.tau * errors.variance_v2.sqrt(), self.tau], says);
-        (self.is_held, self.held_in) = (true, [self.tau, self.damping]);
-        held.factorise(self.kept.count, self.damping)
+        self.held_in = [self.tau, self.damping];
+        self.factorise(held)
     }
 
     /// Takes what is held to what is taken for noise now, and to the weight that there is now; `None` if it makes no sense.
@@ -113,14 +113,26 @@ impl<T: Real, const D: usize> OnUnknown<T, D> {
         if tau != self.tau {
             held.rescale(self.kept.count, self.tau / tau);
         }
-        held.factorise(self.kept.count, self.damping)
+        self.factorise(held)
+    }
+
+    /// Patterns are held if they make sense.
+    fn factorise(&mut self, held: &mut Held<'_, T>) -> Option<()> {
+        let factorised = held.factorise(self.kept.count, self.damping);
+        self.is_held = factorised.is_some();
+        factorised
     }
 }
 
 /// Squares of what was known of a scene before.
 fn prior<T: Real, const K: usize, const D: usize>(scene: &Scene<T, K, D>, radius_deviation: T) -> T {
+    prior_of_radii(scene, radius_deviation) + scene.steps.iter().map(|step| *step * *step).sum()
+}
+
+/// Those of its radii alone.
+fn prior_of_radii<T: Real, const K: usize, const D: usize>(scene: &Scene<T, K, D>, radius_deviation: T) -> T {
     let radii = scene.spots().iter().map(|spot| spot.ln_radius / radius_deviation);
-    radii.chain(scene.steps).map(|deviations| deviations * deviations).sum()
+    radii.map(|deviations| deviations * deviations).sum()
 }
 
 impl<T: Real, const K: usize, const D: usize> Scene<T, K, D> {
@@ -145,7 +157,7 @@ impl<T: Real, const K: usize, const D: usize> Scene<T, K, D> {
 }
 
 impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
-    /// Takes a step.
+    /// Goes one round.
     pub(crate) fn go_round(
         &mut self,
         task: Task<'_, T>,
@@ -250,7 +262,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             self.held_at = self.scene;
         }
         held.set_state(&self.on.kept, &self.scene.steps);
-        self.sum_up(self.scene.count, on, work);
+        self.sum_up(on, work);
         self.is_derived = true;
         self.normal.objective().is_finite().then_some(())
     }
@@ -266,7 +278,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let (mut at, mut least) = (self.scene, self.normal.objective());
         for inner in 0..INNER.min(self.steps) {
             if inner > 0 {
-                self.sum_up(at.count, on, work);
+                self.sum_up(on, work);
             }
             self.steps -= 1;
             let mut is_taken = false;
@@ -303,24 +315,25 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         (self.is_solved, self.is_derived, on.is_moved) = (false, false, true);
         let makes_sense = on.read(scene);
         on.is_moved = false;
-        let noise_v = self.on.tau * on.task.errors.variance_v2.sqrt();
-        on.leave(noise_v);
+        if !makes_sense {
+            return None;
+        }
+        let Task { table, frame, errors, .. } = on.task;
+        on.parts.held.leave(frame, T::of(table.head().full_v), self.on.tau * errors.variance_v2.sqrt());
         let left = on.parts.held.least(self.on.kept.count);
-        let radius_deviation = self.radius_deviation_in(self.on.tau);
-        let radii = scene.spots().iter().map(|spot| spot.ln_radius / radius_deviation);
-        let objective = left + radii.map(|deviations| deviations * deviations).sum::<T>();
-        Some(objective).filter(|objective| makes_sense && objective.is_finite())
+        let objective = left + prior_of_radii(scene, self.radius_deviation_in(self.on.tau));
+        Some(objective).filter(|objective| objective.is_finite())
     }
 
     /// Sums up what contacts that were read leave, with its derivatives.
-    fn sum_up(&mut self, contacts: usize, on: &mut On<'_, '_, T, K>, work: &mut Working<'_, K>) {
+    fn sum_up(&mut self, on: &mut On<'_, '_, T, K>, work: &mut Working<'_, K>) {
         let (frame, noise_v) = (on.task.frame, self.on.tau * on.task.errors.variance_v2.sqrt());
         let radius_deviation = self.radius_deviation_in(self.on.tau);
         let (detector, circuit, held) = on.there();
         let count = self.on.kept.count;
         self.normal.sum_up_held(&detector, circuit, frame, noise_v, radius_deviation, (&mut *held, count));
         held.take(count);
-        work.worked_out(contacts);
+        work.worked_out(circuit.count);
     }
 
     /// Goes as far on the way to a scene as the readings agree to: which share of it.

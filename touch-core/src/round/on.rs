@@ -42,16 +42,6 @@ impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
         true
     }
 
-    /// Notes what is left of the readings, in so much noise (V).
-    pub fn leave(&mut self, noise_v: T) {
-        let Task { table, frame, .. } = self.task;
-        let full_v = T::of(table.head().full_v);
-        let per_v = T::ONE / noise_v;
-        self.parts
-            .held
-            .leave(|index, read_v| left_v(frame, index, full_v, read_v).map_or(T::ZERO, |left_v| per_v * left_v));
-    }
-
     /// Squares of what a scene leaves of the readings, in noise.
     pub fn left<const D: usize>(&mut self, scene: &Scene<T, K, D>) -> Option<T> {
         if !self.read(scene) {
