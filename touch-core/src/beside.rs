@@ -8,7 +8,8 @@
 use crate::circuit::{Circuit, PerElectrode, Spot};
 use crate::fit::{Working, held_ohm};
 use crate::frame::{Errors, Frame, left_v};
-use crate::normal::{Factor, Normal};
+use crate::normal::Normal;
+use crate::posterior::Factor;
 use crate::real::Real;
 use crate::scan::{APART, Candidate, Candidates, places, take};
 use crate::slopes::{Pattern, RowSlopes};

@@ -7,9 +7,11 @@ use core::f32::consts::FRAC_1_SQRT_2;
 
 use crate::circuit::{Circuit, PerElectrode, Spot};
 use crate::fit::{Working, held_ohm};
-use crate::held::{Held, Kept};
+use crate::held::Held;
 use crate::lanes::at_once;
-use crate::normal::{Factor, Normal};
+use crate::local::Sorted;
+use crate::normal::Normal;
+use crate::posterior::Factor;
 use crate::products::dot;
 use crate::real::Real;
 use crate::scan::{APART, Candidate, Candidates, places, take};
@@ -90,7 +92,7 @@ pub(crate) struct Births<'a, 'h, T, const K: usize, const D: usize> {
     pub circuit: &'a Circuit<T, K>,
     pub normal: &'a Normal<T, K>,
     pub held: &'a mut Held<'h, T>,
-    pub kept: &'a Kept<D>,
+    pub sorted: &'a Sorted<D>,
     /// What is taken for noise (V), and how much more that is than noise is.
     pub noise_v: T,
     pub tau: T,
@@ -100,7 +102,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
     /// Takes the best places; none where the contacts are not determined.
     pub fn look(&mut self, best: &mut Candidates<T>, work: &mut Working<'_, K>) {
         let Some(factor) = Factor::of(self.normal, T::of(DAMPING)) else { return };
-        self.held.whiten(self.kept.count);
+        self.held.whiten(self.sorted);
         let table = self.task.table;
         let n = table.electrodes();
         let mut change = [T::ZERO; MAX_ELECTRODES * MAX_ELECTRODES];
@@ -251,7 +253,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
     fn new_square(&mut self, change: &[T], factor: &Factor<T, K>) -> T {
         let all = dot(change, change);
         let mut shared = Vector::<T, K>::ZERO;
-        let by_detector = self.held.shared(change, self.kept.count, &mut shared[..self.normal.count]);
+        let by_detector = self.held.shared(self.sorted, change, &mut shared[..self.normal.count]);
         (all - by_detector - factor.square(shared)).max(T::of(LEAST_NEW) * all)
     }
 }

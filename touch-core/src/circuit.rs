@@ -74,12 +74,13 @@ pub(crate) type PerElectrode<T> = [T; MAX_ELECTRODES];
 #[derive(Clone, Debug)]
 pub(crate) struct Loaded<T> {
     pub spot: Spot<T>,
-    /// Of its place. Once currents are known, what turns its slopes is, of electrodes, the moment times the derivatives of what drives the couples: of that along x by x,
+    /// Of its place. Once derived, what turns its slopes is, of electrodes, the moment times the derivatives of what drives the couples: of that along x by x,
     /// by y (or of that along y by x), of that along y by y, in usual radii; then of both by the radius' logarithm.
     pub sample: Sample<T>,
-    /// Derivatives by the logarithm of the radius of the electrodes' fields, and once currents are known of what these make of them (ohm).
+    /// Once derived: derivatives by the logarithm of the radius of the electrodes' fields and of what currents make of them (ohm).
     pub by_radius_ohm: PerElectrode<T>,
-    /// `Q b` of its place.
+    /// Fields of the electrodes at its place on the detector as its table says, and `Q b` of them (ohm).
+    pub described_ohm: PerElectrode<T>,
     pub walls_ohm: [T; MAX_ELECTRODES + 1],
     /// Resistance with that of the crowded current (ohm).
     pub ohm: T,
@@ -96,9 +97,9 @@ pub(crate) struct Loaded<T> {
     /// Couple of currents that a slope of potential drives (S m2), and quadrupole that a bend does (S m4).
     pub moment_s_m2: T,
     pub quadrupole_s_m4: T,
-    /// Its derivative by the contact's own field (S m2/ohm).
+    /// Once derived: its derivative by the contact's own field (S m2/ohm).
     pub moment_by_own: T,
-    /// Half of their derivatives by the parameters.
+    /// Once derived: half of their derivatives by the parameters.
     pub half_moment_by: [T; PARAMETERS],
     pub half_quadrupole_by: [T; PARAMETERS],
     /// How far the slopes that drive couples are from those of the spread's disc to the wide one's, and what of a change of the spread they change.
@@ -119,6 +120,7 @@ impl<T: Real> Loaded<T> {
         spot: Spot::NONE,
         sample: Sample::NONE,
         by_radius_ohm: [T::ZERO; MAX_ELECTRODES],
+        described_ohm: [T::ZERO; MAX_ELECTRODES],
         walls_ohm: [T::ZERO; MAX_ELECTRODES + 1],
         ohm: T::ZERO,
         share: T::ONE,
@@ -139,39 +141,42 @@ impl<T: Real> Loaded<T> {
         bending_ohm_per_m2: [[T::ZERO; MAX_ELECTRODES]; 2],
     };
 
-    /// Puts a contact there.
+    /// Puts a contact there, on the detector as its table says: fields between places are made of these.
     #[inline(always)]
-    fn load(&mut self, detector: &Detector<'_, T>, spot: Spot<T>) {
+    fn place(&mut self, detector: &Detector<'_, T>, spot: Spot<T>) {
         let (head, n) = (detector.table.head(), detector.table.electrodes());
-        let spread_m = T::of(head.radius_m) * spot.ln_radius.exp();
-        let [small_m2, wide_m2] = head.radii_m.map(|radius_m| T::of(radius_m) * T::of(radius_m));
-        let per_m2 = T::ONE / (wide_m2 - small_m2);
+        let [wide, bent] = [T::ONE, T::of(BENT)].map(|share| way_to_wide(head, share, spread_m(head, &spot)));
         self.spot = spot;
-        let [wide, bent] = [T::ONE, T::of(BENT)].map(|share| per_m2 * (share * spread_m * spread_m - small_m2));
-        detector.sample(spot.at_m, wide, bent, &mut self.sample);
-        self.share = self.sample.value[n + 1].clamp(T::of(LEAST_SHARE), T::ONE);
-        self.ohm = spot.ln_ohm.exp().max(T::of(LEAST_OHM) * (self.sample.value[n] + head.even_ohm(spread_m)));
-        self.per_ln_radius = T::of(2.0) * per_m2 * spread_m * spread_m;
-        self.crowd(head, spread_m, n);
-        for e in 0..n {
-            self.by_radius_ohm[e] = self.per_ln_radius * self.sample.wider[e];
-        }
-        detector.by_walls(&self.sample.value[..n], &mut self.walls_ohm);
+        detector.table.sample(spot.at_m, wide, bent, &mut self.sample);
+        self.described_ohm[..n].copy_from_slice(&self.sample.value[..n]);
+        detector.by_walls(&self.described_ohm[..n], &mut self.walls_ohm);
     }
 
-    /// Finds how the current crowds, and what moment a slope drives.
+    /// Takes it to the detector as it is.
     #[inline(always)]
-    fn crowd(&mut self, head: &Head, spread_m: T, n: usize) {
-        let (ohm, own_ohm) = (self.ohm, self.sample.value[n]);
-        let disc = Disc::of(head, self.share, spread_m, own_ohm, ohm);
+    fn load(&mut self, detector: &Detector<'_, T>) {
+        let (head, n) = (detector.table.head(), detector.table.electrodes());
+        let spread_m = spread_m(head, &self.spot);
+        detector.take(self.spot.at_m, &mut self.sample);
+        self.share = self.sample.value[n + 1].clamp(T::of(LEAST_SHARE), T::ONE);
+        self.ohm = self.spot.ln_ohm.exp().max(T::of(LEAST_OHM) * (self.sample.value[n] + head.even_ohm(spread_m)));
+        self.per_ln_radius = T::of(2.0) * (way_to_wide(head, T::ONE, spread_m) - way_to_wide(head, T::ZERO, spread_m));
+        let disc = Disc::of(head, self.share, spread_m, self.sample.value[n], self.ohm);
         (self.radius_m, self.rest_ohm, self.even_ohm) = (disc.radius_m, disc.rest_ohm, head.even_ohm(disc.radius_m));
         (self.moment_s_m2, self.quadrupole_s_m4) = (disc.couple_s_m2, disc.quadrupole_s_m4);
-        let spread_m2 = spread_m * spread_m;
-        self.driving_share = disc.driving_m2 / spread_m2;
+        self.driving_share = disc.driving_m2 / (spread_m * spread_m);
         self.driving_wide = T::of(0.5) * self.per_ln_radius * (self.driving_share - T::ONE);
+    }
+
+    /// Finds how the moments change, and fields with the radius.
+    #[inline(always)]
+    fn derive(&mut self, head: &Head, n: usize) {
+        let (ohm, own_ohm) = (self.ohm, self.sample.value[n]);
+        let spread_m = spread_m(head, &self.spot);
+        let moments = [self.moment_s_m2, self.quadrupole_s_m4];
         let half_by = |other: Disc<T>, step: T| {
             let half = T::of(0.5) / step;
-            [half * (other.couple_s_m2 - disc.couple_s_m2), half * (other.quadrupole_s_m4 - disc.quadrupole_s_m4)]
+            [half * (other.couple_s_m2 - moments[0]), half * (other.quadrupole_s_m4 - moments[1])]
         };
         let by_ln_ohm =
             half_by(Disc::of(head, self.share, spread_m, own_ohm, ohm * (T::ONE + T::of(STEP))), T::of(STEP));
@@ -190,6 +195,9 @@ impl<T: Real> Loaded<T> {
         let all = |i: usize| [place(0, i), place(1, i), by_ln_ohm[i], by_ln_radius[i] + wider(i)];
         self.moment_by_own = T::of(2.0) * by_own[0];
         (self.half_moment_by, self.half_quadrupole_by) = (all(0), all(1));
+        for e in 0..n {
+            self.by_radius_ohm[e] = self.per_ln_radius * self.sample.wider[e];
+        }
     }
 
     /// Whether a wall cuts it, and leaves so much that its share changes with its place.
@@ -204,19 +212,26 @@ impl<T: Real> Loaded<T> {
         [T::of(0.5) * (xx - yy), xy]
     }
 
-    /// Finds what drives the couples of currents at an electrode, and how that changes.
+    /// Finds what drives the couples of currents at an electrode.
     #[inline(always)]
-    fn drive(&mut self, head: &Head, n: usize, e: usize) {
+    fn drive(&mut self, n: usize, e: usize) {
         let half = T::of(0.5) * self.currents[e];
         for d in 0..2 {
             let over_disc = self.slopes_ohm_per_m[d][e] + self.driving_wide * self.sample.turning[3 + d][e];
             self.driving_ohm_per_m[d][e] = over_disc - half * self.sample.slope[d][n];
         }
+    }
+
+    /// Finds how that changes.
+    #[inline(always)]
+    fn turn(&mut self, head: &Head, n: usize) {
         let by_place = self.moment_s_m2 * T::of(head.radius_m);
         let by_radius = self.moment_s_m2 * self.driving_share * self.per_ln_radius;
         let units = [by_place, by_place, by_place, by_radius, by_radius];
         for (turning, unit) in self.sample.turning.iter_mut().zip(units) {
-            turning[e] = unit * (turning[e] - half * turning[n]);
+            let own = T::of(0.5) * turning[n];
+            let all = turning[..n].iter_mut().zip(&self.currents);
+            all.for_each(|(turning, current)| *turning = unit * (*turning - own * *current));
         }
     }
 
@@ -245,6 +260,17 @@ impl<T: Real> Loaded<T> {
     }
 }
 
+/// How far a contact's current spreads (m).
+fn spread_m<T: Real>(head: &Head, spot: &Spot<T>) -> T {
+    T::of(head.radius_m) * spot.ln_radius.exp()
+}
+
+/// How far a disc whose radius' square is such a share of that of a spread is from the small to the wide one.
+fn way_to_wide<T: Real>(head: &Head, share: T, spread_m: T) -> T {
+    let [small_m2, wide_m2] = head.radii_m.map(|radius_m| T::of(radius_m) * T::of(radius_m));
+    (share * spread_m * spread_m - small_m2) / (wide_m2 - small_m2)
+}
+
 /// Contacts, with all that the readings follow from.
 #[derive(Clone, Debug)]
 pub(crate) struct Circuit<T, const K: usize> {
@@ -259,11 +285,13 @@ pub(crate) struct Circuit<T, const K: usize> {
     /// Slopes (ohm/m) and bends (ohm/m2) of the field at a contact from another one, by the place of the first.
     pub slopes_ohm_per_m: [[[T; 2]; K]; K],
     bends_ohm_per_m2: [[[T; 2]; K]; K],
+    is_derived: bool,
 }
 
 impl<T: Real, const K: usize> Circuit<T, K> {
     pub const EMPTY: Self = Self {
         count: 0,
+        is_derived: false,
         loaded: [Loaded::NONE; K],
         constant_ohm: [T::ZERO; MAX_ELECTRODES],
         loads_ohm: [T::ZERO; MAX_ELECTRODES],
@@ -282,19 +310,22 @@ impl<T: Real, const K: usize> Circuit<T, K> {
 
     #[inline(always)]
     fn solve_all(&mut self, detector: &Detector<'_, T>, spots: &[Spot<T>]) -> bool {
-        self.count = spots.len().min(K);
+        (self.count, self.is_derived) = (spots.len().min(K), false);
         for (loaded, spot) in self.loaded.iter_mut().zip(spots) {
-            loaded.load(detector, *spot);
+            loaded.place(detector, *spot);
         }
         let mut matrix = [[T::ZERO; K]; K];
         for k in 0..self.count {
-            matrix[k][k] = self.loaded[k].ohm;
             for l in 0..k {
                 let (ohm, [at_k, at_l], [bends_k, bends_l]) = self.between(detector, k, l);
                 (matrix[k][l], matrix[l][k]) = (ohm, ohm);
                 (self.slopes_ohm_per_m[k][l], self.slopes_ohm_per_m[l][k]) = (at_k, at_l);
                 (self.bends_ohm_per_m2[k][l], self.bends_ohm_per_m2[l][k]) = (bends_k, bends_l);
             }
+        }
+        for (k, one) in self.loaded.iter_mut().enumerate().take(self.count) {
+            one.load(detector);
+            matrix[k][k] = one.ohm;
         }
         self.find_currents(detector.table, &matrix) && {
             self.find_slopes(detector.table);
@@ -384,11 +415,28 @@ impl<T: Real, const K: usize> Circuit<T, K> {
                     self.loaded[k].slopes_ohm_per_m[d][e] = self.loaded[k].sample.slope[d][e] - by_others;
                 }
             }
-            self.take_widened(table, k);
             let n = table.electrodes();
             (0..n).for_each(|e| self.find_bends(n, k, e));
-            (0..n).for_each(|e| self.loaded[k].drive(table.head(), n, e));
+            (0..n).for_each(|e| self.loaded[k].drive(n, e));
         }
+    }
+
+    /// Finds all that only derivatives need, once.
+    pub fn derive(&mut self, table: &Table<'_>) {
+        if core::mem::replace(&mut self.is_derived, true) {
+            return;
+        }
+        let n = table.electrodes();
+        at_once(
+            #[inline(always)]
+            || {
+                for k in 0..self.count {
+                    self.loaded[k].derive(table.head(), n);
+                    self.take_widened(table, k);
+                    self.loaded[k].turn(table.head(), n);
+                }
+            },
+        );
     }
 
     /// Finds what drives the quadrupoles at an electrode.
@@ -421,7 +469,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     #[inline(always)]
     fn find_loads(&mut self, detector: &Detector<'_, T>) -> bool {
         for g in 0..detector.table.electrodes() {
-            let mut ohm = detector.pads_ohm(g, g) - self.constant_ohm[g] + detector.switch_ohm();
+            let mut ohm = detector.pad_ohm(g) - self.constant_ohm[g] + detector.switch_ohm();
             for one in &self.loaded[..self.count] {
                 let square = |two: &[PerElectrode<T>; 2]| two[0][g] * two[0][g] + two[1][g] * two[1][g];
                 ohm -= one.sample.value[g] * one.currents[g]
@@ -439,21 +487,26 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     /// What is there to be read while an electrode is grounded (V).
     #[inline(always)]
     pub fn row_v(&self, detector: &Detector<'_, T>, g: usize, volts: &mut [T]) {
-        let own_ohm = detector.pads_ohm(g, g) + detector.switch_ohm();
-        let per_ohm = T::of(detector.table.head().drive_v) / self.loads_ohm[g];
-        // Differences, so that the resistance of a light contact, thousands of times as much, does not take their digits.
-        for (e, volts) in volts.iter_mut().enumerate().take(detector.table.electrodes()) {
-            let mut ohm = own_ohm - detector.pads_ohm(e, g);
-            for one in &self.loaded[..self.count] {
-                let less = |two: &[PerElectrode<T>; 2]| {
-                    two[0][g] * (two[0][g] - two[0][e]) + two[1][g] * (two[1][g] - two[1][e])
-                };
-                ohm -= (one.sample.value[g] - one.sample.value[e]) * one.currents[g]
-                    + one.moment_s_m2 * less(&one.driving_ohm_per_m)
-                    + one.quadrupole_s_m4 * less(&one.bending_ohm_per_m2);
+        let volts = &mut volts[..detector.table.electrodes()];
+        let pads_ohm = detector.pads_ohm(g);
+        let own_ohm = pads_ohm[g] + detector.switch_ohm();
+        volts.iter_mut().zip(&pads_ohm).for_each(|(volts, ohm)| *volts = own_ohm - *ohm);
+        for one in &self.loaded[..self.count] {
+            let [driving, bending] = [&one.driving_ohm_per_m, &one.bending_ohm_per_m2];
+            let two = |two: &[PerElectrode<T>; 2], per: T| [per * two[0][g], per * two[1][g]];
+            let (by_slopes, by_bends) = (two(driving, one.moment_s_m2), two(bending, one.quadrupole_s_m4));
+            // Differences, so that the resistance of a light contact, thousands of times as much, does not take their digits.
+            for (e, volts) in volts.iter_mut().enumerate() {
+                let less = |values: &PerElectrode<T>| values[g] - values[e];
+                *volts -= one.currents[g] * (one.sample.value[g] - one.sample.value[e])
+                    + by_slopes[0] * less(&driving[0])
+                    + by_slopes[1] * less(&driving[1])
+                    + by_bends[0] * less(&bending[0])
+                    + by_bends[1] * less(&bending[1]);
             }
-            *volts = per_ohm * ohm;
         }
+        let per_ohm = T::of(detector.table.head().drive_v) / self.loads_ohm[g];
+        volts.iter_mut().for_each(|volts| *volts *= per_ohm);
     }
 
     /// Potentials under a place without a contact, for 1 A into each electrode (ohm), from the fields there.

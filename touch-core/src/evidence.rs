@@ -13,6 +13,7 @@
 use crate::circuit::Circuit;
 use crate::fit::Fit;
 use crate::normal::{ANY_RADIUS, Normal};
+use crate::posterior::Posterior;
 use crate::real::Real;
 use crate::table::Table;
 use crate::vector::{PARAMETERS, Vector};
@@ -50,33 +51,31 @@ pub(crate) fn known<T: Real, const K: usize>(table: &Table<'_>, circuit: &Circui
     along_tangents(table, circuit.loaded.iter().take(circuit.count).map(|one| one.spot.at_m), of_one)
 }
 
-/// Logarithm of the evidence for contacts but for the sum of squares: of the share of what could be before that the readings leave (nats).
+/// Logarithm of the evidence for contacts but for the sum of squares: of the share of what could be before that the readings leave (nats); `None` is where parameters are not
+/// determined.
 pub(crate) fn ln_volume<T: Real, const K: usize>(
     table: &Table<'_>,
     circuit: &Circuit<T, K>,
-    normal: &Normal<T, K>,
+    posterior: Option<&Posterior<T, K>>,
 ) -> T {
     let sides: [T; 2] = sides(table);
     let strength = T::of(CONDUCTANCE_DEVIATION);
-    let weights = known(table, circuit);
-    let Some(ln_determinant) = normal.ln_determinant(&weights) else { return -T::max_value().sqrt() };
+    let Some(posterior) = posterior else { return -T::max_value().sqrt() };
     // Four times half of ln(2 pi), of which the peaks of two normal densities take two.
     let peaks = T::of(core::f64::consts::TAU).ln() - (strength * T::of(ANY_RADIUS)).ln();
     let of_one = peaks - (sides[0] * sides[1]).ln() - T::of(FEWER_NATS);
     let all = (0..circuit.count).map(|k| of_one + T::of(k as u32 + 1).ln() + circuit.loaded[k].ln_over_contact());
-    all.sum::<T>() - T::of(0.5) * ln_determinant + ln_at_walls(table, circuit, normal, &weights)
+    all.sum::<T>() - T::of(0.5) * posterior.ln_determinant + ln_at_walls(table, circuit, posterior)
 }
 
 /// What walls make of that: where they are near, what is left is not normal along places.
 fn ln_at_walls<T: Real, const K: usize>(
     table: &Table<'_>,
     circuit: &Circuit<T, K>,
-    normal: &Normal<T, K>,
-    weights: &Vector<T, K>,
+    Posterior { covariance, step, .. }: &Posterior<T, K>,
 ) -> T {
     let across = Across::both(table);
     let radius_m = T::of(table.head().radius_m);
-    let Some((covariance, step)) = normal.posterior(weights) else { return T::ZERO };
     let of_axis = |k: usize, axis: usize| {
         let i = PARAMETERS * k + axis;
         let error_m = radius_m * covariance[i][i].sqrt();
@@ -86,12 +85,20 @@ fn ln_at_walls<T: Real, const K: usize>(
     (0..circuit.count).map(|k| of_axis(k, 0) + of_axis(k, 1)).sum()
 }
 
-/// Contacts that readings place so badly that they may be elsewhere, a bit each.
-pub(crate) fn loose<T: Real, const K: usize>(table: &Table<'_>, circuit: &Circuit<T, K>, normal: &Normal<T, K>) -> u32 {
-    let Some((covariance, _)) = normal.posterior(&known(table, circuit)) else { return u32::MAX };
+/// Contacts that readings place so badly that they may be elsewhere, a bit each; all where parameters are not determined.
+pub(crate) fn loose<T: Real, const K: usize>(posterior: Option<&Posterior<T, K>>, count: usize) -> u32 {
+    let Some(Posterior { covariance, .. }) = posterior else { return u32::MAX };
     let is_loose = |i: usize| covariance[i][i] > T::of(LOOSE) * T::of(LOOSE);
-    let all = (0..circuit.count).filter(|k| (0..2).any(|d| is_loose(PARAMETERS * k + d)));
+    let all = (0..count).filter(|k| (0..2).any(|d| is_loose(PARAMETERS * k + d)));
     all.fold(0, |all, k| all | 1 << k)
+}
+
+/// What readings say for each contact (squared deviations); without bound where parameters are not determined, but for what is read at all.
+pub(crate) fn information<T: Real, const K: usize>(
+    normal: &Normal<T, K>,
+    posterior: Option<&Posterior<T, K>>,
+) -> [T; K] {
+    posterior.map_or(normal.said, |posterior| posterior.information(normal))
 }
 
 pub(crate) fn freedom<T: Real, const K: usize, const D: usize>(fit: &Fit<T, K, D>) -> T {

@@ -1,8 +1,9 @@
 //! Damped Gauss-Newton steps of contacts to the readings of a frame, one look at them at a time.
 
 use crate::circuit::{Circuit, Spot};
-use crate::evidence::{known, ln_volume};
+use crate::evidence::{information, known, ln_volume};
 use crate::held::Room;
+use crate::local::Sorted;
 use crate::normal::Normal;
 use crate::real::Real;
 use crate::round::OnUnknown;
@@ -242,7 +243,8 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     /// What another round has to gain (squared deviations).
     pub(crate) worth: T,
     /// What is not known of a detector, and the scene whose patterns are held.
-    pub(crate) on: OnUnknown<T, D>,
+    pub(crate) on: OnUnknown<T>,
+    pub(crate) sorted: Sorted<D>,
     pub(crate) held_at: Scene<T, K, D>,
     /// Whether it goes on from the frame before; the last fit whose derivatives were taken where it ended, and what was to become least in it.
     pub(crate) goes_on: bool,
@@ -265,6 +267,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         is_derived: false,
         worth: T::ZERO,
         on: OnUnknown::NONE,
+        sorted: Sorted::NONE,
         held_at: Scene::EMPTY,
         goes_on: false,
         ended: Fit::NONE,
@@ -334,11 +337,13 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     fn fit(&self, task: Task<'_, T>, circuit: &Circuit<T, K>) -> Fit<T, K, D> {
+        let posterior = self.normal.posterior(&known(task.table, circuit));
+        let posterior = posterior.as_ref();
         Fit {
             scene: self.scene,
             cost: self.normal.cost,
-            evidence: T::of(2.0) * ln_volume(task.table, circuit, &self.normal) - self.normal.objective(),
-            information: self.normal.information(&known(task.table, circuit)),
+            evidence: T::of(2.0) * ln_volume(task.table, circuit, posterior) - self.normal.objective(),
+            information: information(&self.normal, posterior),
             radius_deviation: self.radius_deviation,
             ..Fit::NONE
         }

@@ -305,6 +305,7 @@ fn one_more_is_looked_for_where_it_is_missing() {
             }
         };
         assert!(circuit.solve(&Detector::described(&table), alone.scene.spots()));
+        circuit.derive(&table);
         let normal = fitting.normal;
         let (mut done, mut best, mut from, mut pieces) = (<crate::Work>::default(), no_candidates(), Some(0), 0);
         while let Some(at) = from {

@@ -13,15 +13,13 @@
 use crate::circuit::Circuit;
 use crate::frame::{Frame, left_v};
 use crate::lanes::at_once;
+use crate::local::{Locals, Sorted, rows};
 use crate::patterns::Patterns;
-use crate::products::{add, backward, dot, factorise, forward};
+use crate::products::{add, backward, dot, factorise, forward, turn};
 use crate::real::Real;
 use crate::table::Table;
-use crate::unknown::{Detector, Layout, Unknown};
+use crate::unknown::{Detector, Layout, Unknown, pairs};
 use crate::vector::PARAMETERS;
-
-/// Square of a pattern, in noise, below which its direction is left out: it changes a sum of squares by no more.
-const LEAST_SQUARE: f32 = 0.3;
 
 /// Room for a detector that is not known, as much as [`Room::numbers`] and [`Room::floats`] say. What is in it before does not matter; it is to be given again with the
 /// next piece of work.
@@ -50,21 +48,12 @@ impl<T: Real> Room<'_, T> {
 
     /// How many floats there are to be for up to `contacts` contacts.
     pub fn floats(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> usize {
-        unknown.tables + contacts * unknown.of_place(table.electrodes())
+        unknown.tables * (1 + pairs(contacts - 1)) + contacts * unknown.of_place(table.electrodes())
     }
 
     pub(crate) fn parts(&mut self, table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> Parts<'_, T> {
         let (moved, mut rest) = self.numbers.split_at_mut(Layout::of(table, unknown).numbers());
-        let [there_v, patterns, scaled, solved, factor, squares, products, taken, columns, slopes, left, read_v] =
-            counts(table, unknown, contacts).map(|count| {
-                let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
-                rest = after;
-                part
-            });
-        let (shares, fields) = self.floats.split_at_mut(unknown.tables);
-        let fields = &mut fields[..contacts * unknown.of_place(table.electrodes())];
-        let held = Held {
-            fields,
+        let [
             there_v,
             patterns,
             scaled,
@@ -77,17 +66,42 @@ impl<T: Real> Room<'_, T> {
             slopes,
             left,
             read_v,
+            turned,
+        ] = counts(table, unknown, contacts).map(|count| {
+            let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
+            rest = after;
+            part
+        });
+        let (shares, floats) = self.floats.split_at_mut(unknown.tables);
+        let (fields, floats) = floats.split_at_mut(contacts * unknown.of_place(table.electrodes()));
+        let between_ohm = &mut floats[..unknown.tables * pairs(contacts - 1)];
+        let held = Held {
+            fields,
+            between_ohm,
+            there_v,
+            patterns,
+            scaled,
+            solved,
+            factor,
+            squares,
+            products,
+            taken,
+            columns,
+            slopes,
+            left,
+            read_v,
+            turned,
         };
         Parts { moved, shares, held }
     }
 }
 
-fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 12] {
+fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 13] {
     let (readings, count) = (table.electrodes() * table.electrodes(), unknown.directions.len());
     let parameters = PARAMETERS * contacts;
     [
         readings,
-        readings * count,
+        readings * rows(unknown),
         count,
         count,
         count * count,
@@ -98,16 +112,18 @@ fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 
         readings * parameters,
         readings,
         readings,
+        readings,
     ]
 }
 
 /// Patterns that are held.
 #[derive(Debug)]
 pub(crate) struct Held<'m, T> {
-    /// What each table changes at contacts.
+    /// What each table changes at contacts, and between them.
     fields: &'m mut [f32],
+    between_ohm: &'m mut [f32],
     there_v: &'m mut [T],
-    /// In noise: a row of readings for each direction that counts.
+    /// In noise: a row of readings for each common direction, then pairs of [layers](crate::local).
     patterns: &'m mut [T],
     /// `U s` and `U'^-1 s` of where the detector is.
     scaled: &'m mut [T],
@@ -124,6 +140,8 @@ pub(crate) struct Held<'m, T> {
     left: &'m mut [T],
     /// What channels read of contacts at the last look (V).
     read_v: &'m mut [T],
+    /// Room for readings turned.
+    turned: &'m mut [T],
 }
 
 /// A look in the directions of the patterns.
@@ -144,64 +162,61 @@ impl<T: Real> Projected<'_, T> {
     }
 }
 
-/// Which directions count.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Kept<const D: usize> {
-    which: [u16; D],
-    /// How many.
-    pub count: usize,
-}
-
-impl<const D: usize> Kept<D> {
-    /// None.
-    pub const NONE: Self = Self { which: [0; D], count: 0 };
-
-    /// Their numbers.
-    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
-        self.which.iter().take(self.count).map(|which| usize::from(*which))
-    }
-}
-
 impl<T: Real> Held<'_, T> {
-    /// Takes the patterns of contacts that were read, in noise of a deviation (V), of those readings that say something; that is so many times
-    /// what noise is, in which directions count.
+    /// Takes the patterns of contacts that were read, in noise of a deviation (V), of those readings that say something.
     pub fn hold<const K: usize, const D: usize>(
         &mut self,
+        sorted: &Sorted<D>,
         detector: &Detector<'_, T>,
         unknown: &Unknown<'_>,
-        circuit: &Circuit<T, K>,
-        [noise_v, times]: [T; 2],
+        circuit: &mut Circuit<T, K>,
+        noise_v: T,
         says: impl Fn(usize, T) -> bool,
-    ) -> Kept<D> {
-        Patterns::new(detector, unknown, circuit, self.there_v, self.fields).write(self.patterns, self.left);
-        let readings = self.there_v.len();
+    ) {
+        circuit.derive(detector.table);
+        Patterns::new(detector, unknown, circuit, self.there_v, self.fields, self.between_ohm).write(
+            sorted,
+            self.patterns,
+            self.left,
+        );
         for (index, (scale, read_v)) in self.left.iter_mut().zip(&*self.read_v).enumerate() {
             *scale = if says(index, *read_v) { T::ONE / noise_v } else { T::ZERO };
         }
-        let (mut kept, least) = (Kept::NONE, T::of(LEAST_SQUARE) / (times * times));
-        for direction in 0..unknown.directions.len() {
-            let (before, from) = self.patterns.split_at_mut(direction * readings);
-            let pattern = &mut from[..readings];
-            pattern.iter_mut().zip(&*self.left).for_each(|(value, scale)| *value *= *scale);
-            if dot(pattern, pattern) > least {
-                if let Some(to) = before.get_mut(kept.count * readings..(kept.count + 1) * readings) {
-                    to.copy_from_slice(pattern);
-                }
-                kept.which[kept.count] = direction as u16;
-                kept.count += 1;
-            }
+        let (n, readings) = (detector.table.electrodes(), self.there_v.len());
+        turn(self.left, n, self.turned);
+        let (common, layers) = self.patterns.split_at_mut(sorted.commons * readings);
+        let rows = common.chunks_exact_mut(readings).map(|row| (row, &*self.left));
+        let pairs = layers.chunks_exact_mut(2 * readings).take(sorted.layers).map(|pair| pair.split_at_mut(readings));
+        let pairs = pairs.flat_map(|(down, across)| [(down, &*self.left), (across, &*self.turned)]);
+        for (row, scales) in rows.chain(pairs) {
+            row.iter_mut().zip(scales).for_each(|(value, scale)| *value *= *scale);
         }
-        self.multiply(kept.count);
-        kept
+        self.multiply(sorted);
     }
 
     /// Notes products of the patterns with each other.
-    fn multiply(&mut self, count: usize) {
-        let Self { patterns, factor, squares, there_v, .. } = self;
-        let (readings, factor) = (there_v.len(), &mut factor[..count * count]);
-        let patterns = &patterns[..readings * count];
+    fn multiply<const D: usize>(&mut self, sorted: &Sorted<D>) {
+        let (readings, count) = (self.there_v.len(), sorted.count);
+        let n = readings.isqrt();
+        let Self { patterns, factor, squares, turned, .. } = self;
+        let (common, mut locals) = split(patterns, turned, sorted, readings);
+        let factor = &mut factor[..count * count];
         // In the triangle below the factor.
-        T::products(patterns, patterns, readings, true, |i, j, product| factor[i * count + j] = product);
+        let mut note = |i: usize, j: usize, product: T| factor[i.max(j) * count + i.min(j)] = product;
+        T::products(common, common, readings, true, |i, j, product| {
+            if j <= i {
+                note(sorted.common_at(i), sorted.common_at(j), product);
+            }
+        });
+        at_once(
+            #[inline(always)]
+            || {
+                for (number, row) in sorted.common().zip(common.chunks_exact(readings)) {
+                    locals.with(sorted, n, row, |local, product| note(number, local, product));
+                }
+                locals.with_each_other(sorted, n, &mut note);
+            },
+        );
         (0..count).for_each(|i| squares[i] = factor[i * count + i]);
     }
 
@@ -214,8 +229,7 @@ impl<T: Real> Held<'_, T> {
             || {
                 for (g, (there_v, read_v)) in rows.enumerate() {
                     circuit.row_v(detector, g, there_v);
-                    let all = read_v.iter_mut().zip(there_v).enumerate();
-                    all.for_each(|(e, (read_v, there_v))| *read_v = detector.read_v(e, *there_v));
+                    detector.read_v(there_v, read_v);
                 }
             },
         );
@@ -229,7 +243,7 @@ impl<T: Real> Held<'_, T> {
     /// Takes what is held to so many times the noise.
     pub fn rescale(&mut self, count: usize, times: T) {
         let (per_time, per_square) = (T::ONE / times, T::ONE / (times * times));
-        self.patterns[..self.there_v.len() * count].iter_mut().for_each(|value| *value *= per_time);
+        self.patterns.iter_mut().for_each(|value| *value *= per_time);
         self.squares[..count].iter_mut().for_each(|square| *square *= per_square);
         for i in 0..count {
             self.factor[i * count..i * count + i].iter_mut().for_each(|product| *product *= per_square);
@@ -251,9 +265,9 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// Notes where the detector is.
-    pub fn set_state<const D: usize>(&mut self, kept: &Kept<D>, steps: &[T; D]) {
-        let count = kept.count;
-        kept.iter().zip(self.solved.iter_mut()).for_each(|(direction, to)| *to = steps[direction]);
+    pub fn set_state(&mut self, steps: &[T]) {
+        let count = self.solved.len();
+        self.solved.copy_from_slice(&steps[..count]);
         for (i, row) in self.factor.chunks_exact(count.max(1)).enumerate().take(count) {
             self.scaled[i] = dot(&row[i..], &self.solved[i..count]);
         }
@@ -273,9 +287,9 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// Squares of what is left, at least, with those of the steps of the detector that leave it.
-    pub fn least(&mut self, count: usize) -> T {
-        self.project_left(count);
-        dot(self.left, self.left) + self.projected(count).less()
+    pub fn least<const D: usize>(&mut self, sorted: &Sorted<D>) -> T {
+        self.project_left(sorted);
+        dot(self.left, self.left) + self.projected().less()
     }
 
     /// Notes the derivatives of the readings while an electrode is grounded by a parameter, in noise.
@@ -286,24 +300,25 @@ impl<T: Real> Held<'_, T> {
 
     /// The pattern of a direction, in noise.
     #[cfg(test)]
-    pub fn pattern(&self, direction: usize) -> &[T] {
-        let readings = self.there_v.len();
-        &self.patterns[direction * readings..(direction + 1) * readings]
+    pub fn pattern<const D: usize>(&self, sorted: &Sorted<D>, direction: usize) -> std::vec::Vec<T> {
+        crate::local::pattern(sorted, self.patterns, self.there_v.len(), direction)
     }
 
     /// Ends the look at contacts of so many parameters: products of what is left, and of the derivatives, with the patterns are projected.
-    pub fn project(&mut self, count: usize, parameters: usize) {
-        self.project_left(count);
-        let Self { patterns, slopes, left, columns, factor, .. } = self;
-        let readings = left.len();
-        let patterns = &patterns[..readings * count];
-        T::products(&slopes[..readings * parameters], patterns, readings, false, |which, direction, product| {
-            columns[which * count + direction] = product;
+    pub fn project<const D: usize>(&mut self, sorted: &Sorted<D>, parameters: usize) {
+        self.project_left(sorted);
+        let (readings, count) = (self.left.len(), sorted.count);
+        let Self { patterns, slopes, columns, factor, turned, .. } = self;
+        let slopes = &slopes[..readings * parameters];
+        let (common, mut locals) = split(patterns, turned, sorted, readings);
+        T::products(slopes, common, readings, false, |which, place, product| {
+            columns[which * count + sorted.common_at(place)] = product;
         });
         at_once(
             #[inline(always)]
             || {
-                for column in columns.chunks_exact_mut(count.max(1)).take(parameters) {
+                for (slopes, column) in slopes.chunks_exact(readings).zip(columns.chunks_exact_mut(count.max(1))) {
+                    locals.with(sorted, readings.isqrt(), slopes, |local, product| column[local] = product);
                     forward(factor, count, column);
                 }
             },
@@ -311,14 +326,13 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// The same of what is left alone.
-    pub fn project_left(&mut self, count: usize) {
-        let Self { patterns, left, products, factor, .. } = self;
-        let readings = left.len();
-        let patterns = &patterns[..readings * count];
-        T::products(left, patterns, readings, false, |_, direction, product| products[direction] = product);
+    pub fn project_left<const D: usize>(&mut self, sorted: &Sorted<D>) {
+        let Self { patterns, left, products, factor, turned, .. } = self;
+        let (common, mut locals) = split(patterns, turned, sorted, left.len());
+        multiplied(sorted, common, &mut locals, left, products);
         at_once(
             #[inline(always)]
-            || forward(factor, count, &mut products[..count]),
+            || forward(factor, sorted.count, products),
         );
     }
 
@@ -338,20 +352,22 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// What the last look leaves and its derivatives are in the directions of the patterns.
-    pub fn projected(&self, count: usize) -> Projected<'_, T> {
+    pub fn projected(&self) -> Projected<'_, T> {
         let Self { products, scaled, solved, columns, .. } = self;
-        Projected { left: &products[..count], columns, scaled: &scaled[..count], solved: &solved[..count] }
+        Projected { left: products, columns, scaled, solved }
     }
 
     /// Takes what the detector's posterior mean explains from what the last look left.
-    pub fn whiten(&mut self, count: usize) {
-        self.take(count);
-        let Self { taken, patterns, left, factor, .. } = self;
-        let vector = &mut taken[..count];
-        backward(factor, count, vector);
-        for (step, pattern) in vector.iter().zip(patterns.chunks_exact(left.len())) {
-            add(left, -*step, pattern);
+    pub fn whiten<const D: usize>(&mut self, sorted: &Sorted<D>) {
+        self.take();
+        let Self { taken, patterns, left, factor, turned, .. } = self;
+        backward(factor, sorted.count, taken);
+        let readings = left.len();
+        let (common, locals) = split(patterns, turned, sorted, readings);
+        for (number, pattern) in sorted.common().zip(common.chunks_exact(readings)) {
+            add(left, -taken[number], pattern);
         }
+        locals.take(sorted, readings.isqrt(), taken, left);
     }
 
     /// What is left, in noise.
@@ -360,37 +376,67 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// The part of a change's square, in noise, that steps of the detector could do as well; and its products with the derivatives but for what these do too.
-    pub fn shared(&mut self, change: &[T], count: usize, shared: &mut [T]) -> T {
-        let vector = &mut self.taken[..count];
-        let readings = change.len();
-        T::products(change, &self.patterns[..readings * count], readings, false, |_, direction, product| {
-            vector[direction] = product;
-        });
-        T::products(change, &self.slopes[..readings * shared.len()], readings, false, |_, which, product| {
+    pub fn shared<const D: usize>(&mut self, sorted: &Sorted<D>, change: &[T], shared: &mut [T]) -> T {
+        let (readings, count) = (change.len(), sorted.count);
+        let Self { patterns, slopes, columns, taken, factor, turned, .. } = self;
+        let (common, mut locals) = split(patterns, turned, sorted, readings);
+        multiplied(sorted, common, &mut locals, change, taken);
+        T::products(change, &slopes[..readings * shared.len()], readings, false, |_, which, product| {
             shared[which] = product;
         });
-        forward(self.factor, count, vector);
-        for (shared, column) in shared.iter_mut().zip(self.columns.chunks_exact(count.max(1))) {
-            *shared -= dot(&column[..count], vector);
+        at_once(
+            #[inline(always)]
+            || forward(factor, count, taken),
+        );
+        for (shared, column) in shared.iter_mut().zip(columns.chunks_exact(count.max(1))) {
+            *shared -= dot(column, taken);
         }
-        dot(vector, vector)
+        dot(taken, taken)
     }
 
     /// The last look is where contacts are.
-    pub fn take(&mut self, count: usize) {
-        for ((taken, left), solved) in self.taken.iter_mut().zip(&*self.products).zip(&*self.solved).take(count) {
+    pub fn take(&mut self) {
+        for ((taken, left), solved) in self.taken.iter_mut().zip(&*self.products).zip(&*self.solved) {
             *taken = *left - *solved;
         }
     }
 
-    /// Takes those directions that count to the posterior's mean, from where the detector was noted to be.
-    pub fn posterior<const D: usize>(&mut self, kept: &Kept<D>, steps: &mut [T; D]) {
-        backward(self.factor, kept.count, self.taken);
-        kept.iter().zip(self.taken.iter()).for_each(|(direction, step)| steps[direction] += *step);
+    /// Takes the detector to the posterior's mean, from where it was noted to be.
+    pub fn posterior(&mut self, steps: &mut [T]) {
+        backward(self.factor, self.taken.len(), self.taken);
+        self.taken.iter().zip(steps).for_each(|(step, to)| *to += *step);
     }
 
     /// Logarithm of the determinant of `I + p' p`.
-    pub fn ln_determinant(&self, count: usize) -> T {
+    pub fn ln_determinant(&self) -> T {
+        let count = self.taken.len();
         T::of(2.0) * (0..count).map(|i| self.factor[i * count + i].ln()).sum::<T>()
     }
+}
+
+/// Common patterns, and local ones.
+fn split<'a, T, const D: usize>(
+    patterns: &'a mut [T],
+    turned: &'a mut [T],
+    sorted: &Sorted<D>,
+    readings: usize,
+) -> (&'a [T], Locals<'a, T>) {
+    let (common, layers) = patterns.split_at_mut(sorted.commons * readings);
+    (common, Locals { layers, turned })
+}
+
+/// Notes products of some readings with all patterns.
+fn multiplied<T: Real, const D: usize>(
+    sorted: &Sorted<D>,
+    common: &[T],
+    locals: &mut Locals<'_, T>,
+    readings: &[T],
+    products: &mut [T],
+) {
+    let count = readings.len();
+    T::products(readings, common, count, false, |_, place, product| products[sorted.common_at(place)] = product);
+    at_once(
+        #[inline(always)]
+        || locals.with(sorted, count.isqrt(), readings, |local, product| products[local] = product),
+    );
 }

@@ -57,9 +57,9 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         if scene.is_near(&self.ended.scene, T::of(NEAR), table) {
             return true;
         }
-        let Some(covariance) = self.normal.covariance(&known(table, on.circuit)) else { return false };
+        let Some(posterior) = self.normal.posterior(&known(table, on.circuit)) else { return false };
         let ways = scene.ways_from(&self.ended.scene, table);
-        let is_within = |i: usize| ways[i] * ways[i] < T::of(WITHIN * WITHIN) * covariance[i][i];
+        let is_within = |i: usize| ways[i] * ways[i] < T::of(WITHIN * WITHIN) * posterior.covariance[i][i];
         (0..self.normal.count).all(|i| ways[i].abs() < T::of(NEAR) || is_within(i))
     }
 
@@ -68,6 +68,6 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let Task { table, frame, errors, .. } = on.task;
         let held = &mut on.parts.held;
         held.leave(frame, T::of(table.head().full_v), errors.variance_v2.sqrt());
-        normal.sum_up_left(on.circuit, self.radius_deviation, (held, self.on.kept.count));
+        normal.sum_up_left(on.circuit, self.radius_deviation, (held, &self.sorted));
     }
 }

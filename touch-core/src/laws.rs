@@ -198,6 +198,7 @@ fn moments_and_conductances_change_with_the_parameters_as_their_derivatives_say(
     let loaded = |spot: Spot| {
         let mut circuit = Circuit::EMPTY;
         assert!(circuit.solve(&Detector::described(&table), &[spot]));
+        circuit.derive(&table);
         circuit.loaded[0].clone()
     };
     for (at_m, sheets, ln_radius) in
@@ -307,7 +308,7 @@ pub(crate) fn summed(table: &Table<'_>, frame: &Frame<'_>, spots: &[Spot], devia
     let (mut circuit, mut normal) = (Circuit::EMPTY, Normal::EMPTY);
     let detector = Detector::described(table);
     assert!(circuit.solve(&detector, spots));
-    normal.sum_up(&detector, &circuit, frame, &Errors::of(frame, table), deviation);
+    normal.sum_up(&detector, &mut circuit, frame, &Errors::of(frame, table), deviation);
     normal
 }
 
@@ -371,7 +372,7 @@ fn the_normal_matrix_is_how_the_sum_of_squares_bends() {
             let bend = 0.5 * (at(0.02) + at(-0.02)) / (0.02 * 0.02);
             assert!((bend / normal.matrix[i][i] - 1.0).abs() < 0.06, "{i}: {bend} {}", normal.matrix[i][i]);
         }
-        let covariance = normal.covariance(&Vector::ZERO).unwrap();
+        let covariance = normal.posterior(&Vector::ZERO).unwrap().covariance;
         // Times the matrix it is one.
         for i in 0..normal.count {
             for j in 0..normal.count {

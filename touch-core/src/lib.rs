@@ -5,8 +5,8 @@
 //! - [`table`]: the format, and its reader; [`Contents`] writes it
 //! - [`spline`]: what its fields are interpolated with
 //! - `circuit`: readings of a few contacts, and their derivatives
-//! - `normal`, `fit`: least squares
-//! - `unknown`, `patterns`: what is not known of a detector, and what it changes; `held`, `round`: fits with it
+//! - `normal`, `posterior`, `fit`: least squares
+//! - `unknown`, `patterns`: what is not known of a detector, and what it changes; `local`, `held`, `round`: fits with it
 //! - `evidence`: which of two explanations is believed
 //! - `scan`, `beside`, `births`: where a first contact may be, and one more, on a detector that is known or not
 //! - `search`: what explains a frame that what was followed does not
@@ -41,8 +41,10 @@ mod kept;
 mod lanes;
 #[cfg(test)]
 mod laws;
+mod local;
 mod normal;
 mod patterns;
+mod posterior;
 mod products;
 mod real;
 mod round;

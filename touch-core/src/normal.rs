@@ -3,6 +3,8 @@
 use crate::circuit::Circuit;
 use crate::frame::{Errors, Frame, Says, left_v};
 use crate::held::{Held, Projected};
+use crate::local::Sorted;
+use crate::posterior::{Factor, Posterior};
 use crate::products::dot;
 use crate::real::Real;
 use crate::slopes::RowSlopes;
@@ -11,7 +13,7 @@ use crate::unknown::Detector;
 use crate::vector::{Matrix, PARAMETERS, Vector};
 
 /// Which parameter of a contact is that of its resistance.
-const STRENGTH: usize = 2;
+pub(crate) const STRENGTH: usize = 2;
 /// Standard deviation of the logarithm of a radius before anything is read: a factor of two.
 pub(crate) const ANY_RADIUS: f32 = 0.7;
 /// The same while the number of contacts is not known yet: too few would be made as wide as may be, and lead away from those that are missing.
@@ -32,7 +34,7 @@ pub(crate) struct Normal<T, const K: usize> {
     pub known: T,
     /// Diagonal of `J' W J` for each contact's strength by the readings that can speak for one: of a bound from above that it comes up to none does.
     pub said: [T; K],
-    /// What contacts would leave in the linear theory if the detector were as its table says.
+    /// What contacts would leave in the linear theory if the detector were as its table says, where that was asked.
     pub if_known: T,
 }
 
@@ -54,12 +56,13 @@ impl<T: Real, const K: usize> Normal<T, K> {
     pub fn sum_up(
         &mut self,
         detector: &Detector<'_, T>,
-        circuit: &Circuit<T, K>,
+        circuit: &mut Circuit<T, K>,
         frame: &Frame<'_, T>,
         errors: &Errors<T>,
         radius_deviation: T,
     ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
+        circuit.derive(detector.table);
         let (table, head, n) = (detector.table, detector.table.head(), detector.table.electrodes());
         let (mut volts, mut slopes) = ([T::ZERO; MAX_ELECTRODES], [[[T::ZERO; MAX_ELECTRODES]; PARAMETERS]; K]);
         for g in 0..n {
@@ -103,16 +106,17 @@ impl<T: Real, const K: usize> Normal<T, K> {
     }
 
     /// The same, of contacts that were read, with what is not known of the detector, of which patterns are held, in the covariance.
-    pub fn sum_up_held(
+    pub fn sum_up_held<const D: usize>(
         &mut self,
         detector: &Detector<'_, T>,
-        circuit: &Circuit<T, K>,
+        circuit: &mut Circuit<T, K>,
         frame: &Frame<'_, T>,
         noise_v: T,
         radius_deviation: T,
-        (held, count): (&mut Held<'_, T>, usize),
+        (held, sorted): (&mut Held<'_, T>, &Sorted<D>),
     ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
+        circuit.derive(detector.table);
         let (head, n) = (detector.table.head(), detector.table.electrodes());
         let mut slopes = [[[T::ZERO; MAX_ELECTRODES]; PARAMETERS]; K];
         for g in 0..n {
@@ -125,9 +129,10 @@ impl<T: Real, const K: usize> Normal<T, K> {
             );
             // What readings that say nothing would change, and what is left of them, is none.
             let mut scales = [T::ZERO; MAX_ELECTRODES];
-            for (e, there_v) in there_v.iter().enumerate() {
+            detector.gains(there_v, &mut scales[..n]);
+            for (e, scale) in scales.iter_mut().enumerate().take(n) {
                 let left = left_v(frame, g * n + e, T::of(head.full_v), held.read_v()[g * n + e]);
-                scales[e] = left.map_or(T::ZERO, |_| detector.gain(e, *there_v) / noise_v);
+                *scale = left.map_or(T::ZERO, |_| *scale / noise_v);
             }
             for (i, row) in slopes.as_flattened_mut().iter_mut().enumerate().take(self.count) {
                 row.iter_mut().zip(&scales).for_each(|(slope, scale)| *slope *= *scale);
@@ -139,27 +144,26 @@ impl<T: Real, const K: usize> Normal<T, K> {
             }
         }
         held.leave(frame, T::of(head.full_v), noise_v);
-        held.project(count, self.count);
+        held.project(sorted, self.count);
         self.cost = dot(held.left(), held.left());
         held.products(self.count, |i, j, product| self.matrix[i][j] = product, |i, product| self.pull[i] = product);
-        let projected = held.projected(count);
-        self.if_known = self.least_if_known(&projected, radius_deviation);
+        let projected = held.projected();
         self.leave_out(&projected);
         self.leave_out_squares(&projected);
         self.add_known(circuit, radius_deviation);
     }
 
     /// The same of what is left now, by the derivatives and patterns that are kept: those of contacts nearby.
-    pub fn sum_up_left(
+    pub fn sum_up_left<const D: usize>(
         &mut self,
         circuit: &Circuit<T, K>,
         radius_deviation: T,
-        (held, count): (&mut Held<'_, T>, usize),
+        (held, sorted): (&mut Held<'_, T>, &Sorted<D>),
     ) {
-        held.project_left(count);
+        held.project_left(sorted);
         self.cost = dot(held.left(), held.left());
         held.products_with_left(self.count, |i, product| self.pull[i] = product);
-        self.leave_out(&held.projected(count));
+        self.leave_out(&held.projected());
         self.add_known_pull(circuit, radius_deviation);
     }
 
@@ -189,21 +193,21 @@ impl<T: Real, const K: usize> Normal<T, K> {
         }
     }
 
-    /// The least sum of squares in the linear theory if the detector were as its table says.
-    fn least_if_known(&self, Projected { left, columns, scaled, solved }: &Projected<'_, T>, radius_deviation: T) -> T {
+    /// Notes the least sum of squares in the linear theory if the detector were as its table says.
+    pub fn find_if_known(&mut self, Projected { left, columns, scaled, solved }: &Projected<'_, T>) {
         let mut all = *self;
         let count = left.len();
-        // Of what is left and the detector's steps together, `p' p` being `U' U - I`.
-        all.cost += dot(scaled, scaled) - dot(solved, scaled) + T::of(2.0) * dot(left, scaled);
-        let weight = T::ONE / (radius_deviation * radius_deviation);
+        let column = |i: usize| &columns[i * count..(i + 1) * count];
+        // Without steps of the detector, `p' p` being `U' U - I`.
+        all.cost += dot(left, left) + dot(solved, solved) + dot(scaled, scaled)
+            - T::of(2.0) * (dot(solved, scaled) + dot(left, solved) - dot(left, scaled));
         for i in 0..self.count {
-            all.pull[i] += dot(&columns[i * count..(i + 1) * count], scaled);
-            all.matrix[i][i] += if i % PARAMETERS == PARAMETERS - 1 { weight } else { T::ZERO };
+            let column_i = column(i);
+            all.pull[i] += dot(column_i, left) - dot(column_i, solved) + dot(column_i, scaled);
+            (0..=i).for_each(|j| all.matrix[i][j] += dot(column_i, column(j)));
         }
-        match Factor::of(&all, T::of(1e-6)) {
-            Some(factor) => all.cost - factor.square(all.pull),
-            None => all.cost,
-        }
+        let explained = Factor::of(&all, T::of(1e-6)).map_or(T::ZERO, |factor| factor.square(all.pull));
+        self.if_known = all.cost - explained;
     }
 
     fn weigh(&mut self, weight: T) {
@@ -247,23 +251,11 @@ impl<T: Real, const K: usize> Normal<T, K> {
         self.cost + self.known
     }
 
-    /// Logarithm of the determinant of the normal matrix with a prior of these weights of a contact's parameters; `None` where they are not determined.
-    pub fn ln_determinant(&self, weights: &Vector<T, K>) -> Option<T> {
-        let factor = Factor::of(&self.with(weights), T::ZERO)?;
-        Some(T::of(2.0) * (0..self.count).map(|i| (factor.rows[i][i] / factor.scale[i]).ln()).sum::<T>())
-    }
-
-    /// With what was known of each contact's parameters before.
-    fn with(&self, weights: &Vector<T, K>) -> Self {
-        let mut all = *self;
-        (0..self.count).for_each(|i| all.matrix[i][i] += weights[i]);
-        all
-    }
-
     /// The step to the least sum of squares, damped, and by how much that falls in the linear theory; `None` where nothing is determined.
     pub fn step(&self, damping: T) -> Option<(Vector<T, K>, T)> {
         let factor = Factor::of(self, damping)?;
-        let step = factor.solved(self.pull);
+        let mut step = self.pull;
+        factor.solve(&mut step);
         let gain = (0..self.count).map(|i| step[i] * self.pull[i]).sum();
         Some((step, gain))
     }
@@ -276,111 +268,14 @@ impl<T: Real, const K: usize> Normal<T, K> {
         }
     }
 
-    /// What the readings say for each contact (squared deviations): of a light one, whose readings are in proportion to its conductance, the square of them is that
-    /// of the derivative by its logarithm, or what others leave of that. Where it is does not count: that one is there may be told where its place is not. Places are
-    /// known as these weights say.
-    pub fn information(&self, weights: &Vector<T, K>) -> [T; K] {
-        let covariance = self.covariance(weights);
-        core::array::from_fn(|k| {
-            let first = PARAMETERS * k;
-            let left = covariance.as_ref().map_or(T::infinity(), |all| {
-                inverse_diagonal(core::array::from_fn(|i| core::array::from_fn(|j| all[first + i][first + j])))
-            });
-            self.matrix[first + STRENGTH][first + STRENGTH].min(left).min(self.said[k])
-        })
-    }
-
     /// By how much less the readings say for a contact's strength than they would on a detector that is known, at most.
     pub fn less_said(&self) -> T {
         let of_one = |k: usize| self.said[k] / self.matrix[PARAMETERS * k + STRENGTH][PARAMETERS * k + STRENGTH];
         (0..self.count / PARAMETERS).map(of_one).fold(T::ONE, T::max)
     }
 
-    /// Covariance of the parameters, with a prior of these weights; `None` where they are not determined.
-    pub fn covariance(&self, weights: &Vector<T, K>) -> Option<Matrix<T, K>> {
-        self.posterior(weights).map(|(covariance, _)| covariance)
-    }
-
-    /// The same with the step to the mean.
-    pub fn posterior(&self, weights: &Vector<T, K>) -> Option<(Matrix<T, K>, Vector<T, K>)> {
-        let factor = Factor::of(&self.with(weights), T::of(1e-6))?;
-        let mut all = Matrix::<T, K>::ZERO;
-        for (i, column) in all.iter_mut().enumerate().take(self.count) {
-            let mut unit = Vector::<T, K>::ZERO;
-            unit[i] = T::ONE;
-            *column = factor.solved(unit);
-        }
-        Some((all, factor.solved(self.pull)))
-    }
-}
-
-/// The element of the inverse of a contact's covariance that is that of its strength: one over the variance if the rest were known.
-fn inverse_diagonal<T: Real>(mut covariance: [[T; PARAMETERS]; PARAMETERS]) -> T {
-    for pivot in (0..PARAMETERS).filter(|pivot| *pivot != STRENGTH) {
-        let row = covariance[pivot];
-        for other in covariance.iter_mut().enumerate().filter(|(i, _)| *i != pivot).map(|(_, other)| other) {
-            let factor = other[pivot] / row[pivot];
-            other.iter_mut().zip(row).for_each(|(value, of_pivot)| *value -= factor * of_pivot);
-        }
-    }
-    T::ONE / covariance[STRENGTH][STRENGTH].max(T::min_positive_value())
-}
-
-/// Cholesky factor of a damped normal matrix whose diagonal is scaled to one.
-pub(crate) struct Factor<T, const K: usize> {
-    count: usize,
-    rows: Matrix<T, K>,
-    scale: Vector<T, K>,
-}
-
-impl<T: Real, const K: usize> Factor<T, K> {
-    /// Of a normal matrix; `None` where that is not positive definite.
-    pub fn of(normal: &Normal<T, K>, damping: T) -> Option<Self> {
-        let count = normal.count;
-        let mut scale = Vector::<T, K>::ZERO;
-        for i in 0..count {
-            let own = normal.matrix[i][i];
-            if !(own > T::ZERO && own.is_finite()) {
-                return None;
-            }
-            scale[i] = T::ONE / own.sqrt();
-        }
-        let mut rows = Matrix::<T, K>::ZERO;
-        for i in 0..count {
-            for j in 0..=i {
-                let own = if i == j { T::ONE + damping } else { normal.matrix[i][j] * scale[i] * scale[j] };
-                let sum: T = own - (0..j).map(|k| rows[i][k] * rows[j][k]).sum::<T>();
-                rows[i][j] = match i == j {
-                    // Below that, rounding has the say.
-                    true if sum > T::of(1e-6) => sum.sqrt(),
-                    true => return None,
-                    false => sum / rows[j][j],
-                };
-            }
-        }
-        Some(Self { count, rows, scale })
-    }
-
-    /// Square of a vector in the metric of the matrix's inverse.
-    pub fn square(&self, mut right: Vector<T, K>) -> T {
-        self.forward(&mut right);
-        right.iter().take(self.count).map(|value| *value * *value).sum()
-    }
-
-    fn forward(&self, right: &mut Vector<T, K>) {
-        for i in 0..self.count {
-            let sum: T = (0..i).map(|j| self.rows[i][j] * right[j]).sum();
-            right[i] = (right[i] * self.scale[i] - sum) / self.rows[i][i];
-        }
-    }
-
-    fn solved(&self, mut right: Vector<T, K>) -> Vector<T, K> {
-        self.forward(&mut right);
-        for i in (0..self.count).rev() {
-            let sum: T = (i + 1..self.count).map(|j| self.rows[j][i] * right[j]).sum();
-            right[i] = (right[i] - sum) / self.rows[i][i];
-        }
-        (0..self.count).for_each(|i| right[i] *= self.scale[i]);
-        right
+    /// What the readings say, with a prior of these weights; `None` where parameters are not determined.
+    pub fn posterior(&self, weights: &Vector<T, K>) -> Option<Posterior<T, K>> {
+        Posterior::of(self, weights)
     }
 }

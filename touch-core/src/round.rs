@@ -9,10 +9,11 @@ mod on;
 pub(crate) use self::on::On;
 use crate::births::Births;
 use crate::circuit::Circuit;
-use crate::evidence::{known, ln_volume, loose};
+use crate::evidence::{information, known, ln_volume, loose};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
 use crate::frame::{Errors, left_v};
-use crate::held::{Held, Kept, Room};
+use crate::held::{Held, Room};
+use crate::local::Sorted;
 use crate::real::Real;
 use crate::scan::Candidates;
 use crate::solver::Task;
@@ -43,7 +44,7 @@ const ALIKE: f32 = 0.05;
 
 /// Where a fit on a detector that is not known is.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct OnUnknown<T, const D: usize> {
+pub(crate) struct OnUnknown<T> {
     /// What is taken for noise, in deviations of it.
     pub tau: T,
     /// Squares of what is left of the readings, in true noise, and of all that was known before.
@@ -51,8 +52,7 @@ pub(crate) struct OnUnknown<T, const D: usize> {
     prior: T,
     /// Weight of the squares of what the detector's next step is, where that of those of its steps from the description is one.
     pub damping: T,
-    /// Directions whose patterns are held, whether they are, and in how many deviations of noise and with which weight.
-    pub kept: Kept<D>,
+    /// Whether patterns are held, and in how many deviations of noise and with which weight.
     pub is_held: bool,
     held_in: [T; 2],
     /// Whether derivatives are kept of the last fit, in noise.
@@ -62,13 +62,12 @@ pub(crate) struct OnUnknown<T, const D: usize> {
     is_whole: bool,
 }
 
-impl<T: Real, const D: usize> OnUnknown<T, D> {
+impl<T: Real> OnUnknown<T> {
     pub const NONE: Self = Self {
         tau: T::ONE,
         left: T::ZERO,
         prior: T::ZERO,
         damping: T::ONE,
-        kept: Kept::NONE,
         is_held: false,
         held_in: [T::ONE; 2],
         has_gain: false,
@@ -93,32 +92,33 @@ impl<T: Real, const D: usize> OnUnknown<T, D> {
     }
 
     /// Holds the patterns of contacts that are solved and read, in what is taken for noise, of those readings that say something; `None` if they make no sense.
-    fn hold<const K: usize>(
+    fn hold<const K: usize, const D: usize>(
         &mut self,
+        sorted: &Sorted<D>,
         Task { table, frame, errors, unknown }: Task<'_, T>,
         detector: &Detector<'_, T>,
-        circuit: &Circuit<T, K>,
+        circuit: &mut Circuit<T, K>,
         held: &mut Held<'_, T>,
     ) -> Option<()> {
         let full_v = T::of(table.head().full_v);
         let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
-        self.kept = held.hold(detector, unknown?, circuit, [self.tau * errors.variance_v2.sqrt(), self.tau], says);
+        held.hold(sorted, detector, unknown?, circuit, self.tau * errors.variance_v2.sqrt(), says);
         self.held_in = [self.tau, self.damping];
-        self.factorise(held)
+        self.factorise(held, sorted.count)
     }
 
     /// Takes what is held to what is taken for noise now, and to the weight that there is now; `None` if it makes no sense.
-    fn weigh(&mut self, held: &mut Held<'_, T>) -> Option<()> {
+    fn weigh(&mut self, held: &mut Held<'_, T>, count: usize) -> Option<()> {
         let [tau, _] = core::mem::replace(&mut self.held_in, [self.tau, self.damping]);
         if tau != self.tau {
-            held.rescale(self.kept.count, self.tau / tau);
+            held.rescale(count, self.tau / tau);
         }
-        self.factorise(held)
+        self.factorise(held, count)
     }
 
     /// Patterns are held if they make sense.
-    fn factorise(&mut self, held: &mut Held<'_, T>) -> Option<()> {
-        let factorised = held.factorise(self.kept.count, self.damping);
+    fn factorise(&mut self, held: &mut Held<'_, T>, count: usize) -> Option<()> {
+        let factorised = held.factorise(count, self.damping);
         self.is_held = factorised.is_some();
         factorised
     }
@@ -213,7 +213,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// Takes the places where one more contact would explain most of what those of the last fit leave among the best.
     pub(crate) fn births(
-        &self,
+        &mut self,
         task: Task<'_, T>,
         unknown: &Unknown<'_>,
         circuit: &mut Circuit<T, K>,
@@ -223,9 +223,17 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     ) {
         let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K), is_moved: false };
         let (detector, circuit, held) = on.there();
-        let (tau, normal, kept) = (self.on.tau, &self.normal, &self.on.kept);
+        circuit.derive(task.table);
+        let (tau, normal, sorted) = (self.on.tau, &self.normal, &self.sorted);
         let noise_v = tau * task.errors.variance_v2.sqrt();
-        Births { task, detector: &detector, circuit, normal, held, kept, noise_v, tau }.look(best, work);
+        Births { task, detector: &detector, circuit, normal, held, sorted, noise_v, tau }.look(best, work);
+        // What is left is whitened now.
+        self.has_looked = false;
+    }
+
+    /// Whether the last fit ended there, with patterns and derivatives of this scene.
+    pub(crate) fn is_at(&self, scene: &Scene<T, K, D>, radius_deviation: T) -> bool {
+        self.has_looked && self.scene == *scene && self.radius_deviation == radius_deviation
     }
 
     /// Finds how much is left of the readings where the fit begins, if that is not known; `false` if the scene makes no sense.
@@ -255,13 +263,13 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let near = if self.on.tau > T::ONE { NEAR_IN_MISFIT } else { NEAR };
         if self.on.is_held && self.scene.is_near(&self.held_at, T::of(near), task.table) {
             if self.on.held_in != [self.on.tau, self.on.damping] {
-                self.on.weigh(held)?;
+                self.on.weigh(held, self.sorted.count)?;
             }
         } else {
-            self.on.hold(task, &detector, circuit, held)?;
+            self.on.hold(&self.sorted, task, &detector, circuit, held)?;
             self.held_at = self.scene;
         }
-        held.set_state(&self.on.kept, &self.scene.steps);
+        held.set_state(&self.scene.steps);
         self.sum_up(on, work);
         self.is_derived = true;
         self.normal.objective().is_finite().then_some(())
@@ -295,7 +303,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
                     && objective < least
                 {
                     (at, least, is_taken) = (trial, objective, true);
-                    on.parts.held.take(self.on.kept.count);
+                    on.parts.held.take();
                     self.is_better();
                     break;
                 }
@@ -306,7 +314,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             }
         }
         self.damping = self.damping.min(T::ONE);
-        on.parts.held.posterior(&self.on.kept, &mut at.steps);
+        on.parts.held.posterior(&mut at.steps);
         (before - least >= worth).then_some(at)
     }
 
@@ -320,7 +328,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         }
         let Task { table, frame, errors, .. } = on.task;
         on.parts.held.leave(frame, T::of(table.head().full_v), self.on.tau * errors.variance_v2.sqrt());
-        let left = on.parts.held.least(self.on.kept.count);
+        let left = on.parts.held.least(&self.sorted);
         let objective = left + prior_of_radii(scene, self.radius_deviation_in(self.on.tau));
         Some(objective).filter(|objective| objective.is_finite())
     }
@@ -330,9 +338,9 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let (frame, noise_v) = (on.task.frame, self.on.tau * on.task.errors.variance_v2.sqrt());
         let radius_deviation = self.radius_deviation_in(self.on.tau);
         let (detector, circuit, held) = on.there();
-        let count = self.on.kept.count;
-        self.normal.sum_up_held(&detector, circuit, frame, noise_v, radius_deviation, (&mut *held, count));
-        held.take(count);
+        let held_on = (&mut *held, &self.sorted);
+        self.normal.sum_up_held(&detector, circuit, frame, noise_v, radius_deviation, held_on);
+        held.take();
         work.worked_out(circuit.count);
     }
 
@@ -383,23 +391,26 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             return None;
         }
         let (_, circuit, held) = on.there();
+        self.normal.find_if_known(&held.projected());
         if self.on.tau != T::ONE {
             self.normal.weigh_radii(circuit, [self.radius_deviation_in(self.on.tau), self.radius_deviation]);
             self.is_derived = false;
         }
         let steps: T = self.scene.steps.iter().map(|step| *step * *step).sum();
-        let volume = T::of(2.0) * ln_volume(table, circuit, &self.normal) - held.ln_determinant(self.on.kept.count);
+        let posterior = self.normal.posterior(&known(table, circuit));
+        let posterior = posterior.as_ref();
+        let volume = T::of(2.0) * ln_volume(table, circuit, posterior) - held.ln_determinant();
         self.on.has_gain = self.on.tau == T::ONE && self.on.is_whole;
         self.ended_objective = self.normal.objective();
         self.ended = Fit {
             scene: self.scene,
             cost: self.on.left + steps,
             evidence: volume - self.on.left - prior(&self.scene, self.radius_deviation),
-            information: self.normal.information(&known(table, circuit)),
+            information: information(&self.normal, posterior),
             if_known: self.normal.if_known,
             less_said: self.normal.less_said(),
             radius_deviation: self.radius_deviation,
-            loose: loose(table, circuit, &self.normal),
+            loose: loose(posterior, circuit.count),
             ..Fit::NONE
         };
         Some(self.ended)

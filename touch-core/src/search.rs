@@ -194,10 +194,14 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
                     // Others of the first are on the same hill.
                     return self.grow_beyond(tried);
                 }
+                // Beside others on a detector that is not known, what is left is seldom the fault of the start: of 360 scenes as many are right without more of them, in a seventh less time.
+                let may_be_better = !fits && (self.terms.is_known || self.at.scene.count == 0 || self.tried.is_none());
                 // One alone that readings place badly reads nearly alike elsewhere.
                 let may_be_elsewhere = self.at.scene.count == 0
                     && self.tried.is_some_and(|tried| tried.scene.count == 1 && self.is_loose(&tried, 0));
-                if (!fits || may_be_elsewhere) && self.starts.get(next).is_some_and(|start| start.gain > T::ZERO) {
+                if (may_be_better || may_be_elsewhere)
+                    && self.starts.get(next).is_some_and(|start| start.gain > T::ZERO)
+                {
                     return self.start(next, readings);
                 }
                 let Some(tried) = self.tried else { return self.added(None, readings) };

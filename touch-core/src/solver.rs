@@ -15,6 +15,7 @@ use crate::evidence::{freedom, is_misfit, is_nothing, limit, score, weakest};
 use crate::fit::{Bench, Fit, Fitting, Scene, Went, Work, Working};
 use crate::frame::{Errors, Frame, FrameError};
 use crate::held::Room;
+use crate::local::Sorted;
 use crate::normal::ANY_RADIUS;
 use crate::real::Real;
 use crate::scan::{first, no_candidates};
@@ -258,7 +259,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     ) -> Result<Option<Answer<T, K>>, FrameError> {
         frame.check(table)?;
         let (frame, left_out) = frame.without_broken(table);
-        let errors = self.errors_of(&frame, table, unknown.is_some());
+        let errors = self.errors_of(&frame, table, unknown);
         let task = Task { table, frame: &frame, errors: &errors, unknown };
         if self.stage == Stage::Idle {
             (self.stage, self.work) = (Stage::Followed, Work::NONE);
@@ -275,13 +276,14 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     }
 
     /// What is known of a frame's errors. Where one begins, it is found whether patterns are held on.
-    fn errors_of(&mut self, frame: &Frame<'_, T>, table: &Table<'_>, is_unknown: bool) -> Errors<T> {
+    fn errors_of(&mut self, frame: &Frame<'_, T>, table: &Table<'_>, unknown: Option<&Unknown<'_>>) -> Errors<T> {
         let mut errors = Errors::of(frame, table);
-        if is_unknown {
+        if unknown.is_some() {
             // Pads are among what is not known.
             errors.pads.fill(T::ZERO);
         }
         if self.stage == Stage::Idle {
+            self.fitting.sorted = unknown.map_or(Sorted::NONE, Sorted::of);
             self.fitting.on.begin_frame(&mut errors, frame.volts.len());
         }
         errors
@@ -311,7 +313,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
                 _ => Some(self.search.placed(readings)),
             },
             Piece::Beside(from) => {
-                let (fitting, starts) = (&self.fitting, &mut self.search.starts);
+                let (fitting, starts) = (&mut self.fitting, &mut self.search.starts);
                 if D > 0
                     && let (Some(unknown), Some(room)) = (task.unknown, &mut bench.room)
                 {
@@ -349,8 +351,13 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             Wants::Fit(scene, radius_deviation, steps) => self.fit(scene, radius_deviation, steps),
             Wants::First => self.piece = Piece::First,
             Wants::Beside(scene, radius_deviation) => {
-                self.fit(scene, radius_deviation, 0);
-                (self.search.starts, self.piece) = (no_candidates(), Piece::Others);
+                self.search.starts = no_candidates();
+                if task.unknown.is_some() && self.fitting.is_at(&scene, radius_deviation) {
+                    self.piece = Piece::Beside(0);
+                } else {
+                    self.fit(scene, radius_deviation, 0);
+                    self.piece = Piece::Others;
+                }
             }
             Wants::Nothing(found) => return self.found(found, task),
         }

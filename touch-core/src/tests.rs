@@ -72,7 +72,7 @@ fn slopes_are_the_differences_of_the_sum_of_squares() {
     let summed = |spots: &[Spot]| {
         let (mut circuit, mut normal) = (Circuit::EMPTY, Normal::EMPTY);
         assert!(circuit.solve(&Detector::described(&table), spots));
-        normal.sum_up(&Detector::described(&table), &circuit, &frame, &errors, ANY_RADIUS);
+        normal.sum_up(&Detector::described(&table), &mut circuit, &frame, &errors, ANY_RADIUS);
         normal
     };
     let mut begun = truth;

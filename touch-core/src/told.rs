@@ -4,11 +4,11 @@ use crate::answer::{Answer, Contact, Flags};
 use crate::evidence::{freedom, is_misfit, known, limit};
 use crate::fit::{Fit, LN_RADII, LN_SQUARES, Scene};
 use crate::frame::Says;
+use crate::posterior::Posterior;
 use crate::real::Real;
 use crate::solver::{Solver, Task};
 use crate::table::Table;
 use crate::unknown::Detector;
-use crate::vector::{Matrix, Vector};
 use crate::walls::NearWalls;
 
 /// Conductance (sheet conductances) above which more would change nothing.
@@ -71,10 +71,9 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         answer
     }
 
-    fn contact(&self, k: usize, table: &Table<'_>, posterior: Option<&(Matrix<T, K>, Vector<T, K>)>) -> Contact<T> {
+    fn contact(&self, k: usize, table: &Table<'_>, posterior: Option<&Posterior<T, K>>) -> Contact<T> {
         let (loaded, radius_m) = (&self.circuit.loaded[k], T::of(table.head().radius_m));
-        let near_walls =
-            posterior.map(|(covariance, step)| NearWalls::of(table, loaded.spot.at_m, k, covariance, step));
+        let near_walls = posterior.map(|posterior| NearWalls::of(table, loaded.spot.at_m, k, posterior));
         let of = |i: usize, j: usize| near_walls.as_ref().map_or(T::infinity(), |known| known.covariance[i][j]);
         let at_m = near_walls.as_ref().map_or(loaded.spot.at_m, |known| known.at_m);
         // What the readings do not tell is known as well as where a fit may go.

@@ -32,6 +32,13 @@ pub enum Change {
     Bow(usize, f32),
 }
 
+impl Change {
+    /// Whether it is of what is there, rather than of what channels make of it.
+    pub(crate) fn is_there(&self) -> bool {
+        matches!(self, Self::Pad(..) | Self::Crowding(..) | Self::Switch(_))
+    }
+}
+
 /// A direction in which a detector may differ.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Direction {
@@ -41,6 +48,8 @@ pub struct Direction {
     pub square: Option<usize>,
     /// What it changes besides: numbers of changes.
     pub changes: Range<usize>,
+    /// The electrode at which alone anything differs, if there is one: its field, and those between it and others, and what is its own. No square is of such.
+    pub electrode: Option<usize>,
 }
 
 /// All that is not known of a detector of `n` electrodes, whose table has `nx` by `ny` coefficients over places and `k` over distances, in so many tables of changes.
@@ -52,14 +61,16 @@ pub struct Unknown<'a> {
     pub changes: &'a [Change],
     /// How many tables there are.
     pub tables: usize,
-    /// Coefficients of changes of the fields of the electrodes, and of the disc's own (ohm): rows of `y`, in them of `x`, for each all tables of `n + 1`.
+    /// Electrodes of the last tables, of each of which it is the field of one electrode alone that changes.
+    pub electrodes: &'a [usize],
+    /// Coefficients of changes of the fields of the electrodes, and of the disc's own (ohm): rows of `y`, in them of `x`, for each tables of `n + 1`, and of those of one electrode of one.
     pub fields_ohm: &'a [f32],
     /// Changes of the fields between the electrodes (ohm): tables of lower triangles. On the diagonal, the field of an electrode at itself, they are those of its logarithm
     /// times what it is: its current crowds at the pad, where what a direction makes of the layer is a factor.
     pub pads_ohm: &'a [f32],
     /// Changes of the spline over distances (ohm): tables of `k`.
     pub distances_ohm: &'a [f32],
-    /// Changes of `Q`: tables of lower triangles of `n + 1`.
+    /// Changes of `Q`: tables of lower triangles of `n + 1`. They are of what the fields of the electrodes are by the table that is changed: what fields change is among them.
     pub walls: &'a [f32],
     /// Ends of the range of each channel's converter (V).
     pub ranges_v: &'a [[f32; 2]],
@@ -92,21 +103,24 @@ impl Unknown<'_> {
         self.changes.get(direction.changes.clone()).unwrap_or(&[])
     }
 
-    /// A channel's bow over its height at a voltage (V), and its derivative (1/V).
-    pub(crate) fn bow<T: Real>(&self, e: usize, volts: T) -> [T; 2] {
-        let [low_v, high_v] = self.ranges_v.get(e).map_or([T::ZERO, T::ONE], |range_v| range_v.map(T::of));
-        let per_v = T::ONE / (high_v - low_v);
-        let share = per_v * (volts - low_v);
-        if !(share > T::ZERO && share < T::ONE) {
-            return [T::ZERO; 2];
-        }
-        let four = T::of(4.0);
-        [four * share * (T::ONE - share), four * per_v * (T::ONE - share - share)]
+    /// How many tables change more than the field of an electrode.
+    fn common_tables(&self) -> usize {
+        self.tables - self.electrodes.len()
+    }
+
+    /// The electrode whose field is all that a table changes, if it is one of those.
+    pub(crate) fn electrode_of(&self, which: usize) -> Option<usize> {
+        self.electrodes.get(which.checked_sub(self.common_tables())?).copied()
+    }
+
+    /// How many numbers all tables have at a coefficient, and so at a place.
+    fn at_once(&self, electrodes: usize) -> usize {
+        self.common_tables() * (electrodes + 1) + self.electrodes.len()
     }
 
     /// Changes of all tables at a coefficient.
     fn node(&self, node: usize, electrodes: usize) -> &[f32] {
-        let count = self.tables * (electrodes + 1);
+        let count = self.at_once(electrodes);
         self.fields_ohm.get(node * count..(node + 1) * count).unwrap_or(&[])
     }
 
@@ -124,7 +138,10 @@ impl Unknown<'_> {
         for (which, node) in stencil.nodes.into_iter().enumerate() {
             let mut change = [0.0f32; MAX_ELECTRODES + 1];
             let change = &mut change[..count];
-            blend(shares, self.node(node, table.electrodes()), change);
+            let (common, local) = self.node(node, table.electrodes()).split_at(self.common_tables() * count);
+            blend(shares, common, change);
+            let shares = &shares[self.common_tables()..];
+            shares.iter().zip(local).zip(self.electrodes).for_each(|((share, ohm), e)| change[*e] += share * ohm);
             let [value, x, y, xx, xy, yy] = stencil.weights.each_ref().map(|weights| weights[which]);
             for (q, ohm) in change.iter().enumerate() {
                 let ohm = T::of(*ohm);
@@ -140,13 +157,13 @@ impl Unknown<'_> {
 
     /// How many numbers it takes what all tables change at a place.
     pub(crate) fn of_place(&self, electrodes: usize) -> usize {
-        3 * self.tables * (electrodes + 1)
+        3 * self.at_once(electrodes)
     }
 
     /// What all tables change at a place: fields, and their derivatives along x and y.
     #[inline(always)]
     pub(crate) fn all_at<T: Real>(&self, electrodes: usize, stencil: &Stencil<T>, all: &mut [f32]) {
-        let count = self.tables * (electrodes + 1);
+        let count = self.at_once(electrodes);
         all.fill(0.0);
         for (index, node) in stencil.nodes.into_iter().enumerate() {
             let changes = self.node(node, electrodes);
@@ -156,11 +173,19 @@ impl Unknown<'_> {
         }
     }
 
+    /// Those of the field of the electrode of a table that changes that alone.
+    #[inline(always)]
+    pub(crate) fn of_electrode<T: Real>(&self, electrodes: usize, which: usize, all: &[f32]) -> [T; 3] {
+        let (count, place) = (self.at_once(electrodes), self.common_tables() * electrodes + which);
+        core::array::from_fn(|part| T::of(all[part * count + place]))
+    }
+
     /// Those of a table.
     #[inline(always)]
     pub(crate) fn of_table<T: Real>(&self, electrodes: usize, which: usize, all: &[f32], at: &mut Fields<T>) {
         let count = electrodes + 1;
-        let mut parts = all.chunks_exact(self.tables * count).map(|all| &all[which * count..(which + 1) * count]);
+        let parts = all.chunks_exact(self.at_once(electrodes));
+        let mut parts = parts.map(|all| &all[which * count..(which + 1) * count]);
         let [value, x, y] = core::array::from_fn(|_| parts.next().unwrap_or(&[]));
         for (to, from) in [&mut at.value].into_iter().chain(&mut at.slope).zip([value, x, y]) {
             to.iter_mut().zip(from).take(electrodes).for_each(|(to, from)| *to = T::of(*from));
@@ -192,19 +217,32 @@ pub(crate) struct Moved<'m, T> {
     pub steps: &'m [T],
     /// Share of each table.
     pub shares: &'m [f32],
-    /// Fields between electrodes, the spline over distances, `Q`.
+    /// Fields between electrodes, the spline over distances, `Q`: whole rows.
     pub pads_ohm: &'m [T],
     pub distances_ohm: &'m [T],
     pub walls: &'m [T],
-    /// Of each channel.
+    /// Of each channel; its range begins there (V), and is one over so much long (1/V).
     pub gains: &'m [T],
     pub offsets_v: &'m [T],
     pub bows_v: &'m [T],
+    lows_v: &'m [T],
+    per_v: &'m [T],
     /// Factor on each electrode's field at itself.
     pub crowding: &'m [T],
     /// Own impedance of each pad, and the switch's (ohm).
     pub own_pads_ohm: &'m [T],
     pub switch_ohm: T,
+}
+
+impl<T: Real> Moved<'_, T> {
+    /// A channel's bow over its height at a voltage (V), and its derivative (1/V).
+    #[inline(always)]
+    pub fn bow(&self, e: usize, volts: T) -> [T; 2] {
+        let (per_v, four) = (self.per_v[e], T::of(4.0));
+        let share = per_v * (volts - self.lows_v[e]);
+        let inside = if share > T::ZERO && share < T::ONE { four } else { T::ZERO };
+        [inside * share * (T::ONE - share), inside * per_v * (T::ONE - share - share)]
+    }
 }
 
 /// Where that is kept.
@@ -222,14 +260,24 @@ fn add_part<T: Real>(sums: &mut [T], share: T, parts: &[f32], which: usize) {
     sums.iter_mut().zip(part).for_each(|(sum, ohm)| *sum += share * T::of(*ohm));
 }
 
+/// Makes the lower triangle of a symmetric matrix, which the first numbers are, to the matrix.
+fn square<T: Copy>(numbers: &mut [T], side: usize) {
+    for i in (0..side).rev() {
+        (0..=i).rev().for_each(|j| numbers[i * side + j] = numbers[pairs(i) + j]);
+    }
+    for i in 0..side {
+        (0..i).for_each(|j| numbers[j * side + i] = numbers[i * side + j]);
+    }
+}
+
 impl Layout {
     pub fn of(table: &Table<'_>, unknown: &Unknown<'_>) -> Self {
         Self { electrodes: table.electrodes(), knots: table.knots(), directions: unknown.directions.len() }
     }
 
-    fn counts(&self) -> [usize; 9] {
+    fn counts(&self) -> [usize; 11] {
         let n = self.electrodes;
-        [self.directions, pairs(n), self.knots, pairs(n + 1), n, n, n, n, n + 1]
+        [self.directions, n * n, self.knots, (n + 1) * (n + 1), n, n, n, n, n, n, n + 1]
     }
 
     /// How many numbers it takes.
@@ -246,10 +294,15 @@ impl Layout {
         numbers: &'m mut [T],
         shares: &'m mut [f32],
     ) -> Moved<'m, T> {
-        let [own, pads, distances, walls, crowding, gains, offsets, bows, last] = self.parts(&mut *numbers);
-        own.copy_from_slice(&steps[..self.directions]);
-        table.parts([&mut *pads, &mut *distances, &mut *walls]);
         let n = self.electrodes;
+        let [own, all_pads, distances, all_walls, crowding, gains, offsets, bows, lows_v, per_v, last] =
+            self.parts(&mut *numbers);
+        own.copy_from_slice(&steps[..self.directions]);
+        let (pads, walls) = (&mut all_pads[..pairs(n)], &mut all_walls[..pairs(n + 1)]);
+        table.parts([&mut *pads, &mut *distances, &mut *walls]);
+        for ((low, per_v), [low_v, high_v]) in lows_v.iter_mut().zip(&mut *per_v).zip(unknown.ranges_v) {
+            (*low, *per_v) = (T::of(*low_v), T::ONE / (T::of(*high_v) - T::of(*low_v)));
+        }
         gains.fill(T::ZERO);
         offsets.fill(T::ZERO);
         bows.fill(T::ZERO);
@@ -285,12 +338,15 @@ impl Layout {
             last[e] = own_ohm * factor;
         }
         last[n] = T::of(table.head().on_resistance_ohm) * last[n].exp();
+        square(all_pads, n);
+        square(all_walls, n + 1);
         self.as_moved(numbers, shares)
     }
 
     /// What was worked out last.
     pub fn as_moved<'m, T: Real>(&self, numbers: &'m mut [T], shares: &'m [f32]) -> Moved<'m, T> {
-        let [steps, pads_ohm, distances_ohm, walls, crowding, gains, offsets_v, bows_v, last] = self.parts(numbers);
+        let [steps, pads_ohm, distances_ohm, walls, crowding, gains, offsets_v, bows_v, lows_v, per_v, last] =
+            self.parts(numbers);
         let (own_pads_ohm, switch_ohm) = (&last[..self.electrodes], last[self.electrodes]);
         Moved {
             steps,
@@ -301,13 +357,15 @@ impl Layout {
             gains,
             offsets_v,
             bows_v,
+            lows_v,
+            per_v,
             crowding,
             own_pads_ohm,
             switch_ohm,
         }
     }
 
-    fn parts<'m, T>(&self, numbers: &'m mut [T]) -> [&'m mut [T]; 9] {
+    fn parts<'m, T>(&self, numbers: &'m mut [T]) -> [&'m mut [T]; 11] {
         let mut rest = numbers;
         self.counts().map(|count| {
             let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
@@ -330,9 +388,8 @@ impl<'a, T: Real> Detector<'a, T> {
         Self { table, moved: None }
     }
 
-    /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives; second ones as far as `bent` says.
-    pub fn sample(&self, at_m: [T; 2], wide: T, bent: T, sample: &mut Sample<T>) {
-        self.table.sample(at_m, wide, bent, sample);
+    /// Takes what the table says of a place (m) to what is there.
+    pub fn take(&self, at_m: [T; 2], sample: &mut Sample<T>) {
         if let Some((unknown, moved)) = &self.moved
             && unknown.tables > 0
         {
@@ -340,12 +397,23 @@ impl<'a, T: Real> Detector<'a, T> {
         }
     }
 
-    /// Field between two electrodes (ohm).
-    pub fn pads_ohm(&self, e: usize, g: usize) -> T {
+    /// Fields between an electrode and all (ohm).
+    #[inline(always)]
+    pub fn pads_ohm(&self, g: usize) -> [T; MAX_ELECTRODES] {
+        let (mut all, n) = ([T::ZERO; MAX_ELECTRODES], self.table.electrodes());
         match &self.moved {
-            Some((_, moved)) => of_pair(moved.pads_ohm, e, g),
-            None => T::of(self.table.pads_ohm(e, g)),
+            Some((_, moved)) => all[..n].copy_from_slice(&moved.pads_ohm[g * n..(g + 1) * n]),
+            None => {
+                all.iter_mut().enumerate().take(n).for_each(|(e, ohm)| *ohm = T::of(self.table.pads_ohm(e, g)));
+            }
         }
+        all
+    }
+
+    /// The field of an electrode at itself (ohm).
+    pub fn pad_ohm(&self, g: usize) -> T {
+        let there = |moved: &Moved<'a, T>| moved.pads_ohm[g * self.table.electrodes() + g];
+        self.moved.as_ref().map_or_else(|| T::of(self.table.pads_ohm(g, g)), |(_, moved)| there(moved))
     }
 
     /// Resistance of a switch (ohm).
@@ -353,18 +421,25 @@ impl<'a, T: Real> Detector<'a, T> {
         self.moved.as_ref().map_or_else(|| T::of(self.table.head().on_resistance_ohm), |(_, moved)| moved.switch_ohm)
     }
 
-    /// What a channel makes of a voltage, but for what the table says of it (V).
-    pub fn read_v(&self, e: usize, volts: T) -> T {
-        self.moved.as_ref().map_or(volts, |(unknown, moved)| {
-            moved.gains[e] * volts + moved.offsets_v[e] + moved.bows_v[e] * unknown.bow(e, volts)[0]
-        })
+    /// What channels make of voltages, but for what the table says of it (V).
+    #[inline(always)]
+    pub fn read_v(&self, volts: &[T], read_v: &mut [T]) {
+        read_v.copy_from_slice(volts);
+        let Some((_, moved)) = &self.moved else { return };
+        let Moved { gains, offsets_v, bows_v, .. } = moved;
+        for (e, read_v) in read_v.iter_mut().enumerate() {
+            *read_v = gains[e] * *read_v + offsets_v[e] + bows_v[e] * moved.bow(e, *read_v)[0];
+        }
     }
 
-    /// What a channel makes of a small change of a voltage.
-    pub fn gain(&self, e: usize, volts: T) -> T {
-        self.moved
-            .as_ref()
-            .map_or(T::ONE, |(unknown, moved)| moved.gains[e] + moved.bows_v[e] * unknown.bow(e, volts)[1])
+    /// What channels make of small changes of voltages.
+    #[inline(always)]
+    pub fn gains(&self, volts: &[T], gains: &mut [T]) {
+        gains.fill(T::ONE);
+        let Some((_, moved)) = &self.moved else { return };
+        for ((e, gain), volts) in gains.iter_mut().enumerate().zip(volts) {
+            *gain = moved.gains[e] + moved.bows_v[e] * moved.bow(e, *volts)[1];
+        }
     }
 
     /// The value alone (ohm) of [that part](Self::by_ways_ohm) of the field between two places, roughly: what a look at one more contact needs.
@@ -423,20 +498,22 @@ impl<'a, T: Real> Detector<'a, T> {
     /// `Q b` of the fields at a place.
     #[inline(always)]
     pub fn by_walls(&self, fields_ohm: &[T], products: &mut [T; MAX_ELECTRODES + 1]) {
+        let n = fields_ohm.len();
+        let with_constant = || fields_ohm.iter().copied().chain([T::ONE]);
         match &self.moved {
-            Some((_, moved)) => walled(|a, b| of_pair(moved.walls, a, b), fields_ohm, products),
-            None => walled(|a, b| T::of(self.table.walls.of_pair(a, b)), fields_ohm, products),
+            Some((_, moved)) => {
+                let products = &mut products[..n + 1];
+                products.fill(T::ZERO);
+                let rows = moved.walls.chunks_exact(n + 1);
+                rows.zip(with_constant()).for_each(|(row, ohm)| add(products, ohm, row));
+            }
+            None => {
+                for (row, product) in products.iter_mut().enumerate().take(n + 1) {
+                    let terms = with_constant().enumerate();
+                    *product = terms.map(|(s, ohm)| T::of(self.table.walls.of_pair(row, s)) * ohm).sum();
+                }
+            }
         }
-    }
-}
-
-/// `Q b` of the fields at a place.
-#[inline(always)]
-fn walled<T: Real>(walls: impl Fn(usize, usize) -> T, fields_ohm: &[T], products: &mut [T; MAX_ELECTRODES + 1]) {
-    let n = fields_ohm.len();
-    for (row, product) in products.iter_mut().enumerate().take(n + 1) {
-        let sum: T = fields_ohm.iter().enumerate().map(|(s, u)| walls(row, s) * *u).sum();
-        *product = sum + walls(row, n);
     }
 }
 

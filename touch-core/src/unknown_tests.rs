@@ -3,9 +3,11 @@
 use std::vec::Vec;
 
 use crate::circuit::{Circuit, Spot};
+use crate::evidence::information;
 use crate::frame::{Errors, Frame};
-use crate::held::{Held, Kept};
+use crate::held::Held;
 use crate::lanes::Lanes;
+use crate::local::Sorted;
 use crate::normal::{ANY_RADIUS, Normal};
 use crate::samples::{CELLS, KNOTS, fields_ohm, grid_m, table};
 use crate::solver::Solver;
@@ -44,11 +46,14 @@ impl MadeUp {
                 fields.extend(own.iter().map(|ohm| share * ohm).chain([30.0]));
                 fields.extend(own.iter().map(|ohm| 0.5 * share * share * ohm).chain([3.0]));
                 let off = fields_ohm(&pads_m, [at_m[0] - 0.001, at_m[1]]);
-                fields.extend((0..N).map(|e| if e == 5 { off[e] - own[e] } else { 0.0 }).chain([0.0]));
+                fields.push(off[5] - own[5]);
             }
         }
-        let each =
-            |values: [f32; TABLES], count: usize| values.into_iter().flat_map(move |v| std::iter::repeat_n(v, count));
+        fn each<const M: usize>(values: [f32; M], count: usize) -> impl Iterator<Item = f32> {
+            values.into_iter().flat_map(move |v| std::iter::repeat_n(v, count))
+        }
+        let of_pair = |e: usize, g: usize| if e == 5 || g == 5 { 0.3 } else { 0.0 };
+        let of_electrode = (0..N).flat_map(|e| (0..=e).map(move |g| of_pair(e, g)));
         let changes = std::vec![
             Change::Gain(3, 0.01),
             Change::Offset(2, 0.002),
@@ -59,18 +64,22 @@ impl MadeUp {
             Change::Pad(8, 0.5),
             Change::Crowding(8, 0.1),
         ];
-        let alone = |number: usize| Direction { table: None, square: None, changes: number..number + 1 };
+        let alone = |number: usize, electrode: Option<usize>| Direction {
+            changes: number..number + 1,
+            electrode,
+            ..Direction::default()
+        };
         let mut directions = std::vec![
-            Direction { table: Some(0), square: Some(1), changes: 0..0 },
-            Direction { table: Some(2), square: None, changes: 0..0 },
+            Direction { table: Some(0), square: Some(1), ..Direction::default() },
+            Direction { table: Some(2), electrode: Some(5), ..Direction::default() },
         ];
-        directions.extend((0..5).map(alone));
-        directions.push(Direction { table: None, square: None, changes: 5..8 });
+        directions.extend([Some(3), Some(2), Some(7), None, Some(1)].into_iter().enumerate().map(|(i, e)| alone(i, e)));
+        directions.push(Direction { changes: 5..8, electrode: Some(8), ..Direction::default() });
         Self {
             directions,
             changes,
             fields_ohm: fields,
-            pads_ohm: each([5.0, 1.0, 0.3], pairs(N)).collect(),
+            pads_ohm: each([5.0, 1.0], pairs(N)).chain(of_electrode).collect(),
             distances_ohm: each([8.0, 1.0, 0.0], KNOTS).collect(),
             walls: each([2e-6, 1e-7, 0.0], pairs(N + 1)).collect(),
         }
@@ -81,6 +90,7 @@ impl MadeUp {
             directions: &self.directions,
             changes: &self.changes,
             tables: TABLES,
+            electrodes: &[5],
             fields_ohm: &self.fields_ohm,
             pads_ohm: &self.pads_ohm,
             distances_ohm: &self.distances_ohm,
@@ -112,8 +122,9 @@ fn read_v(table: &Table<'_>, made_up: &MadeUp, steps: [f64; DIRECTIONS], spots: 
         assert!(circuit.solve(detector, spots));
         let mut volts = std::vec![0.0; N * N];
         volts.chunks_exact_mut(N).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
-        volts.iter_mut().enumerate().for_each(|(index, volts)| *volts = detector.read_v(index % N, *volts));
-        volts
+        let mut read_v = volts.clone();
+        volts.chunks_exact(N).zip(read_v.chunks_exact_mut(N)).for_each(|(row, read_v)| detector.read_v(row, read_v));
+        read_v
     })
 }
 
@@ -153,16 +164,20 @@ fn patterns_are_differences() {
                 };
                 let (ahead, behind) = (moved(1e-3), moved(-1e-3));
                 let expected: Vec<f64> = ahead.iter().zip(&behind).map(|(a, b)| (a - b) / 2e-3).collect();
-                let found = on_moved(&table, &made_up, at, |detector, unknown| {
-                    let mut circuit = Circuit::<f64, 3>::EMPTY;
-                    assert!(circuit.solve(detector, &spots));
-                    let (mut there_v, mut all) = (std::vec![0.0; N * N], std::vec![0.0; N * N * DIRECTIONS]);
-                    there_v.chunks_exact_mut(N).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
-                    let mut fields = std::vec![0.0; Room::<f64>::floats(&table, unknown, 3)];
-                    crate::patterns::Patterns::new(detector, unknown, &circuit, &there_v, &mut fields)
-                        .write(&mut all, &mut std::vec![0.0; N * N]);
-                    all[direction * N * N..(direction + 1) * N * N].to_vec()
-                });
+                let found =
+                    on_moved(&table, &made_up, at, |detector, unknown| {
+                        let mut circuit = Circuit::<f64, 3>::EMPTY;
+                        assert!(circuit.solve(detector, &spots));
+                        circuit.derive(&table);
+                        let (mut there_v, mut all) = (std::vec![0.0; N * N], std::vec![0.0; N * N * DIRECTIONS]);
+                        there_v.chunks_exact_mut(N).enumerate().for_each(|(g, row)| circuit.row_v(detector, g, row));
+                        let mut fields = std::vec![0.0; Room::<f64>::floats(&table, unknown, 3)];
+                        let sorted = Sorted::<DIRECTIONS>::of(unknown);
+                        let (fields, between_ohm) = fields.split_at_mut(3 * unknown.of_place(N));
+                        crate::patterns::Patterns::new(detector, unknown, &circuit, &there_v, fields, between_ohm)
+                            .write(&sorted, &mut all, &mut std::vec![0.0; N * N]);
+                        crate::local::pattern(&sorted, &all, N * N, direction)
+                    });
                 let largest = expected.iter().fold(0.0f64, |most, v| most.max(v.abs()));
                 let off = expected.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(off < 5e-4 * largest, "{direction} at {at:?} under {spots:?}: {off} of {largest}");
@@ -191,17 +206,17 @@ fn the_sum_of_squares_is_that_of_the_posteriors_mean() {
                 assert!(circuit.solve(detector, spots));
                 held.read(detector, &circuit);
                 // Whether they are held in it, or were in another noise.
-                let kept: Kept<DIRECTIONS> = held.hold(detector, unknown, &circuit, [3.0 * noise_v, 1.0], |_, _| true);
-                assert_eq!(kept.count, DIRECTIONS);
-                held.rescale(kept.count, 1.0 / 3.0);
-                held.factorise(kept.count, 1.0).unwrap();
-                held.set_state(&kept, &at);
+                let sorted = Sorted::<DIRECTIONS>::of(unknown);
+                held.hold(&sorted, detector, unknown, &mut circuit, 3.0 * noise_v, |_, _| true);
+                held.rescale(DIRECTIONS, 1.0 / 3.0);
+                held.factorise(DIRECTIONS, 1.0).unwrap();
+                held.set_state(&at);
                 let mut normal = Normal::EMPTY;
-                normal.sum_up_held(detector, &circuit, &frame, noise_v, f64::from(ANY_RADIUS), (held, kept.count));
-                held.take(kept.count);
+                normal.sum_up_held(detector, &mut circuit, &frame, noise_v, f64::from(ANY_RADIUS), (held, &sorted));
+                held.take();
                 let mut mean = at;
-                held.posterior(&kept, &mut mean);
-                let patterns: Vec<Vec<f64>> = (0..DIRECTIONS).map(|k| held.pattern(k).to_vec()).collect();
+                held.posterior(&mut mean);
+                let patterns: Vec<Vec<f64>> = (0..DIRECTIONS).map(|k| held.pattern(&sorted, k)).collect();
                 let predicted = read_v(&table, &made_up, at, spots);
                 let left = |steps: &[f64; DIRECTIONS]| {
                     let of_reading = |index: usize| {
@@ -253,11 +268,11 @@ fn what_is_said_for_a_contact_does_not_count_where_it_is() {
     (0..8).for_each(|i| normal.matrix[i][i] = 1000.0);
     normal.said = [1000.0; 3];
     normal.matrix[2][0] = 999.0;
-    let said = normal.information(&Vector::ZERO);
+    let said = information(&normal, normal.posterior(&Vector::ZERO).as_ref());
     assert!((said[0] - 1000.0).abs() < 1.0 && (said[1] - 1000.0).abs() < 1.0, "{said:?}");
     normal.matrix[6][2] = 999.0;
     normal.matrix[2][0] = 0.0;
-    let said = normal.information(&Vector::ZERO);
+    let said = information(&normal, normal.posterior(&Vector::ZERO).as_ref());
     assert!((said[0] - 2.0).abs() < 0.1 && (said[1] - 2.0).abs() < 0.1, "{said:?}");
 }
 

@@ -10,9 +10,10 @@
 //! and even between these, they are straight, and where steps and standard errors are those of `w`, a fit does not stay at a wall that it came to, and what is known of a place there is not less
 //! than it is. All places are alike likely, those beyond a wall are not: what is told is the mean over those that are left.
 
+use crate::posterior::Posterior;
 use crate::real::Real;
 use crate::table::Table;
-use crate::vector::{Matrix, PARAMETERS, Vector};
+use crate::vector::{PARAMETERS, Vector};
 
 /// How far fields bend, `b` (usual radii): over half of the usual distance of electrodes.
 const BENT: f32 = 3.0;
@@ -205,8 +206,7 @@ impl<T: Real> NearWalls<T> {
         table: &Table<'_>,
         at_m: [T; 2],
         k: usize,
-        covariance: &Matrix<T, K>,
-        step: &Vector<T, K>,
+        Posterior { covariance, step, .. }: &Posterior<T, K>,
     ) -> Self {
         let first = PARAMETERS * k;
         let all = core::array::from_fn(|i| core::array::from_fn(|j| covariance[first + i][first + j]));

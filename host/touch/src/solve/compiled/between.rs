@@ -74,9 +74,8 @@ pub(super) struct Paired {
     factor: Cholesky<f64, Dyn>,
     /// Unit of the fields (ohm).
     scale_ohm: f64,
-    /// `Q b` of the places, but for the change of `Q`.
-    walls: DMatrix<f64>,
-    fields_ohm: Vec<Vec<f64>>,
+    /// How many electrodes.
+    electrodes: usize,
 }
 
 /// Fields of spots at the places, in the gauge in which the electrodes' have no mean, and those between pairs (ohm).
@@ -116,38 +115,23 @@ impl Paired {
         (0..matrix.nrows()).for_each(|i| matrix[(i, i)] += RIDGE * (1.0 + matrix[(i, i)]));
         let factor =
             Cholesky::new(matrix).ok_or_else(|| failed(modelled, "places do not determine what is between them"))?;
-        let mut paired = Self {
-            ways,
-            places_m,
-            pairs,
-            design,
-            factor,
-            scale_ohm,
-            walls: DMatrix::zeros(0, 0),
-            fields_ohm: sampled.fields_ohm,
-        };
+        let paired = Self { ways, places_m, pairs, design, factor, scale_ohm, electrodes: n };
         let between = paired.fitted(&sampled.between_ohm);
-        paired.walls = paired.by_walls(&between);
         Ok((paired, between))
     }
 
-    /// What changes of models make of it: the sum of these, each so many times. `None` if one has no spots.
+    /// None.
+    pub fn nothing(&self) -> Between {
+        let n = self.electrodes;
+        Between { distances: vec![0.0; KNOTS], walls: vec![0.0; (n + 1) * (n + 2) / 2] }
+    }
+
+    /// What changes of models make of it, by the fields that are not changed: the sum of these, each so many times. `None` if one has no spots.
     pub fn change(&self, parts: &[(f64, Arc<dyn ForwardModel>)]) -> Option<Between> {
         let mut between_ohm = DVector::zeros(self.pairs.len());
-        let mut fields_ohm: Vec<Vec<f64>> = self.fields_ohm.iter().map(|fields| vec![0.0; fields.len()]).collect();
         for (share, model) in parts {
             let sampled = Sampled::of(&**model, self.ways.near_m, &self.places_m, &self.pairs)?;
             between_ohm += sampled.between_ohm * *share;
-            for (sums, fields) in fields_ohm.iter_mut().zip(&sampled.fields_ohm) {
-                sums.iter_mut().zip(fields).for_each(|(sum, ohm)| *sum += share * ohm);
-            }
-        }
-        // What the fields' own changes make of the form is left to them.
-        let with = |k: usize, l: usize| -> f64 {
-            fields_ohm[k].iter().enumerate().map(|(e, ohm)| ohm * self.walls[(e, l)]).sum()
-        };
-        for (ohm, [k, l]) in between_ohm.iter_mut().zip(&self.pairs) {
-            *ohm -= with(*k, *l) + with(*l, *k);
         }
         Some(self.fitted(&between_ohm))
     }
@@ -160,21 +144,11 @@ impl Paired {
 
     fn fitted(&self, between_ohm: &DVector<f64>) -> Between {
         let found = self.factor.solve(&self.design.tr_mul(between_ohm));
-        let n = self.fields_ohm.first().map_or(0, Vec::len);
+        let n = self.electrodes;
         let units = |s: usize| if s == n { 1.0 } else { self.scale_ohm };
         let indices = (0..=n).flat_map(|s| (0..=s).map(move |t| (s, t)));
         let walls = indices.zip(found.iter().skip(KNOTS)).map(|((s, t), q)| q / (units(s) * units(t))).collect();
         Between { distances: found.iter().take(KNOTS).copied().collect(), walls }
-    }
-
-    /// `Q b` of all places: a column each.
-    fn by_walls(&self, between: &Between) -> DMatrix<f64> {
-        let n = self.fields_ohm.first().map_or(0, Vec::len);
-        let form = |s: usize, t: usize| between.walls[s.max(t) * (s.max(t) + 1) / 2 + s.min(t)];
-        DMatrix::from_fn(n + 1, self.places_m.len(), |s, place| {
-            let fields = &self.fields_ohm[place];
-            fields.iter().enumerate().map(|(t, ohm)| form(s, t) * ohm).sum::<f64>() + form(s, n)
-        })
     }
 }
 

@@ -24,6 +24,8 @@ pub(crate) struct Changes {
     directions: Vec<Direction>,
     changes: Vec<Change>,
     tables: usize,
+    /// Of the last tables, which change the field of one electrode alone.
+    electrodes: Vec<usize>,
     /// Some megabytes, which all that measure the detector share.
     fields_ohm: Arc<Vec<f32>>,
     pads_ohm: Vec<f32>,
@@ -33,8 +35,11 @@ pub(crate) struct Changes {
     own_pads_ohm: Vec<f32>,
 }
 
-/// Models whose sum, each so many times, is a change.
-type Sum = Vec<(f64, Arc<dyn ForwardModel>)>;
+/// Models whose sum, each so many times, is a change, and the electrode at which alone anything differs, if there is one.
+struct Sum {
+    models: Vec<(f64, Arc<dyn ForwardModel>)>,
+    electrode: Option<usize>,
+}
 
 /// One table of changes.
 struct Table {
@@ -42,6 +47,8 @@ struct Table {
     fields_ohm: Option<DMatrix<f64>>,
     pads_ohm: DMatrix<f64>,
     between: Between,
+    /// The electrode whose field, and those between which and others, are all that changes, if there is one.
+    electrode: Option<usize>,
 }
 
 /// A parameter with fields.
@@ -98,6 +105,7 @@ impl Changes {
             directions: &self.directions,
             changes: &self.changes,
             tables: self.tables,
+            electrodes: &self.electrodes,
             fields_ohm: &self.fields_ohm,
             pads_ohm: &self.pads_ohm,
             distances_ohm: &self.distances_ohm,
@@ -143,15 +151,20 @@ impl Changes {
                 }
             };
             let changes = start..self.changes.len();
-            self.directions.push(Direction { table, square: square.filter(|_| is_alone), changes });
+            let electrode = match &steps[..] {
+                [(parameter, _)] if of_fields.is_empty() || is_alone => parameter.electrode(),
+                _ => None,
+            };
+            self.directions.push(Direction { table, square: square.filter(|_| is_alone), changes, electrode });
         }
     }
 
     /// The tables that directions have, in the order in which they are stored.
     fn write_tables(&mut self, tables: &[Table], sides: [usize; 2], electrodes: usize) {
         let mut used: Vec<usize> = self.directions.iter().flat_map(|of| [of.table, of.square]).flatten().collect();
-        used.sort_unstable();
+        used.sort_unstable_by_key(|table| (tables[*table].electrode.is_some(), *table));
         used.dedup();
+        self.electrodes = used.iter().filter_map(|table| tables[*table].electrode).collect();
         let renumbered = |old: Option<usize>| old.and_then(|old| used.iter().position(|table| *table == old));
         for direction in &mut self.directions {
             (direction.table, direction.square) = (renumbered(direction.table), renumbered(direction.square));
@@ -162,7 +175,8 @@ impl Changes {
         for node in 0..sides[0] * sides[1] {
             for table in used.iter().map(of) {
                 let value = |q: usize| table.fields_ohm.as_ref().map_or(0.0, |fields| fields[(node, q)]);
-                fields_ohm.extend((0..=electrodes).map(|q| value(q) as f32));
+                let all = table.electrode.map_or(0..electrodes + 1, |e| e..e + 1);
+                fields_ohm.extend(all.map(|q| value(q) as f32));
             }
         }
         for table in used.iter().map(of) {
@@ -180,7 +194,7 @@ impl Changes {
         for e in (0..detector.electrodes.len()).filter(|e| !lone.contains(e)) {
             let start = self.changes.len();
             self.changes.push(Change::Crowding(e, PAD_ERROR as f32));
-            self.directions.push(Direction { table: None, square: None, changes: start..start + 1 });
+            self.directions.push(Direction { changes: start..start + 1, electrode: Some(e), ..Direction::default() });
         }
     }
 
@@ -199,7 +213,7 @@ impl Changes {
                 let start = self.changes.len();
                 if deviation > 0.0 && electrodes().next().is_some() {
                     self.changes.extend(electrodes().map(|e| change(e, deviation as f32)));
-                    self.directions.push(Direction { table: None, square: None, changes: start..self.changes.len() });
+                    self.directions.push(Direction { changes: start..self.changes.len(), ..Direction::default() });
                 }
             };
             add(converter.gain_share, Change::Gain);
@@ -249,15 +263,16 @@ fn sums_of(
         let deviation = square.sqrt();
         let (models, sign) = changed_models(coarse, parameter, deviation)?;
         let (linear, mut second) = (sums.len(), None);
+        let sum = |models| Sum { models, electrode: parameter.electrode() };
         match &models[..] {
             [] => continue,
             [ahead, behind] => {
                 let both = |a: f64, b: f64| vec![(a, Arc::clone(ahead)), (b, Arc::clone(behind))];
-                sums.push(both(0.5, -0.5));
+                sums.push(sum(both(0.5, -0.5)));
                 second = Some(sums.len());
-                sums.push(both(1.0, 1.0).into_iter().chain([(-2.0, Arc::clone(coarse))]).collect());
+                sums.push(sum(both(1.0, 1.0).into_iter().chain([(-2.0, Arc::clone(coarse))]).collect()));
             }
-            [ahead, ..] => sums.push(vec![(sign, Arc::clone(ahead)), (-sign, Arc::clone(coarse))]),
+            [ahead, ..] => sums.push(sum(vec![(sign, Arc::clone(ahead)), (-sign, Arc::clone(coarse))])),
         }
         compiled.push(Compiled { parameter, deviation, linear, square: second });
     }
@@ -287,7 +302,7 @@ fn table_of(
     // An electrode's field at itself changes by factors: their logarithms are summed up.
     let there_ohm = coarse.electrode_fields_ohm().diagonal();
     let mut at_itself_ohm = DVector::zeros(n);
-    for (share, model) in sum {
+    for (share, model) in &sum.models {
         let own = if Arc::ptr_eq(model, coarse) { None } else { Some(sampled(&**model, splines, radius_m)?) };
         for (sums, fields) in values.iter_mut().zip(own.as_deref().unwrap_or(base)) {
             sums.iter_mut().zip(fields).for_each(|(sum, ohm)| *sum += share * ohm);
@@ -302,8 +317,29 @@ fn table_of(
         detector: coarse.detector().name.clone(),
         what: "its model has no small contacts".to_owned(),
     };
-    let between = paired.change(sum).ok_or_else(what)?;
-    Ok(Table { fields_ohm: Some(splines.fitted(&values)), pads_ohm, between })
+    let between = match sum.electrode {
+        Some(e) => {
+            leave_to(e, &mut values, &mut pads_ohm);
+            paired.nothing()
+        }
+        None => paired.change(&sum.models).ok_or_else(what)?,
+    };
+    Ok(Table { fields_ohm: Some(splines.fitted(&values)), pads_ohm, between, electrode: sum.electrode })
+}
+
+/// Leaves what one electrode changes to its own field, those at other electrodes, and to nothing else. Models' fields are such that the mean over the electrodes vanishes,
+/// so that all change with one, and those of places too: but a function of the place that all fields have in common makes no difference to readings.
+fn leave_to(electrode: usize, values: &mut [Vec<f64>], pads_ohm: &mut DMatrix<f64>) {
+    let n = pads_ohm.nrows();
+    for fields in values {
+        let others: f64 = (0..n).filter(|e| *e != electrode).map(|e| fields[e]).sum();
+        let own = fields[electrode] - others / (n - 1) as f64;
+        fields.fill(0.0);
+        fields[electrode] = own;
+    }
+    for e in (0..n).filter(|e| *e != electrode) {
+        (0..n).filter(|g| *g != electrode).for_each(|g| pads_ohm[(e, g)] = 0.0);
+    }
 }
 
 /// What a driving sheet of one ohm per square changes: it is as if contacts had fields at each other.
@@ -313,7 +349,7 @@ fn of_driving_sheet(detector: &Detector, paired: &Paired) -> Table {
         let contacts = [a, b].map(|[x_m, y_m]| Contact::flat(x_m, y_m, paired.ways.near_m, 1.0));
         sheet_drops_ohm(detector, &contacts)[(0, 1)]
     };
-    Table { fields_ohm: None, pads_ohm: DMatrix::zeros(n, n), between: paired.of_function(drop) }
+    Table { fields_ohm: None, pads_ohm: DMatrix::zeros(n, n), between: paired.of_function(drop), electrode: None }
 }
 
 /// The sum of some tables, each so many times.
@@ -326,6 +362,7 @@ fn mixed(parts: &[(f64, usize)], tables: &[Table]) -> Table {
             distances: vec![0.0; first.between.distances.len()],
             walls: vec![0.0; first.between.walls.len()],
         },
+        electrode: None,
     };
     for (share, table) in parts.iter().map(|(share, table)| (*share, &tables[*table])) {
         if let Some(fields) = &table.fields_ohm {
