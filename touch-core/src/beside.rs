@@ -5,9 +5,11 @@
 //! a row are its scalar products with `p`; all others are summed up once. Likewise what the contacts that there are could do as well: their derivatives are
 //! bilinear in what the electrode read and the grounded one have of them.
 
-use crate::circuit::{Circuit, PerElectrode, Spot};
+use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::fit::{Working, held_ohm};
 use crate::frame::{Errors, Frame, left_v};
+use crate::loaded::{PerElectrode, Spot};
 use crate::normal::Normal;
 use crate::posterior::Factor;
 use crate::real::Real;
@@ -15,7 +17,6 @@ use crate::scan::{APART, Candidate, Candidates, places, take};
 use crate::slopes::{Pattern, RowSlopes};
 use crate::solver::Task;
 use crate::table::{MAX_ELECTRODES, Table};
-use crate::unknown::Detector;
 use crate::vector::{PARAMETERS, Vector};
 
 /// Damping of the normal equations in what contacts that are there could do as well, and share of a pattern that is taken for new at least: the host's.

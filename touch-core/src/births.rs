@@ -5,10 +5,12 @@
 
 use core::f32::consts::FRAC_1_SQRT_2;
 
-use crate::circuit::{Circuit, PerElectrode, Spot};
+use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::fit::{Working, held_ohm};
 use crate::held::Held;
 use crate::lanes::at_once;
+use crate::loaded::{PerElectrode, Spot};
 use crate::local::Sorted;
 use crate::normal::Normal;
 use crate::posterior::Factor;
@@ -17,7 +19,6 @@ use crate::real::Real;
 use crate::scan::{APART, Candidate, Candidates, places, take};
 use crate::solver::Task;
 use crate::table::MAX_ELECTRODES;
-use crate::unknown::Detector;
 use crate::vector::Vector;
 
 /// Places that are looked at closely.

@@ -1,8 +1,8 @@
 //! What a table says of places: fields of discs, fields between them, and forces.
 
-use crate::circuit::TURNED;
 use crate::head::Head;
 use crate::lanes::at_once;
+use crate::loaded::TURNED;
 use crate::real::Real;
 use crate::spline::weights;
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, OTHERS, QUANTITIES, RADII, Table};

@@ -1,15 +1,16 @@
 //! Damped Gauss-Newton steps of contacts to the readings of a frame, one look at them at a time.
 
-use crate::circuit::{Circuit, Spot};
+use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::evidence::{information, known, ln_volume};
 use crate::held::Room;
+use crate::loaded::Spot;
 use crate::local::Sorted;
 use crate::normal::Normal;
 use crate::real::Real;
 use crate::round::OnUnknown;
 use crate::solver::{BOARD_CONTACTS, Task};
 use crate::table::Table;
-use crate::unknown::Detector;
 use crate::vector::{PARAMETERS, Vector};
 use crate::walls::Across;
 

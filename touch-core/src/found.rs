@@ -2,6 +2,7 @@
 
 use std::vec::Vec;
 
+use crate::detector::Detector;
 use crate::fit::{Bench, Fitting, Scene as AnyScene, Went};
 use crate::frame::Errors;
 use crate::laws::{ALL, solved, summed, tables};
@@ -10,7 +11,6 @@ use crate::samples::{CELLS, grid_m, table, table_of};
 use crate::scan::{first, no_candidates};
 use crate::solver::Task;
 use crate::tests::{Circuit, Scene, Spot, noisy, spot, volts};
-use crate::unknown::Detector;
 use crate::vector::{PARAMETERS, Vector};
 use crate::{Flags, Frame, Says, Solver, Table};
 

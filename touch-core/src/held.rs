@@ -11,14 +11,16 @@
 //! however far the detector is from its description.
 
 use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::frame::{Frame, left_v};
 use crate::lanes::at_once;
 use crate::local::{Locals, Sorted, rows};
+use crate::moved::Layout;
 use crate::patterns::Patterns;
 use crate::products::{add, backward, dot, factorise, forward, turn};
 use crate::real::Real;
 use crate::table::Table;
-use crate::unknown::{Detector, Layout, Unknown, pairs};
+use crate::unknown::{Unknown, pairs};
 use crate::vector::PARAMETERS;
 
 /// Room for a detector that is not known, as much as [`Room::numbers`] and [`Room::floats`] say. What is in it before does not matter; it is to be given again with the

@@ -2,12 +2,12 @@
 
 use std::vec::Vec;
 
-use crate::circuit::BENT;
+use crate::detector::Detector;
 use crate::frame::{Errors, left_v};
+use crate::loaded::BENT;
 use crate::normal::{ANY_RADIUS, USUAL_RADIUS};
 use crate::samples::{CELLS, field_ohm, fields_ohm, grid_m, table, table_of};
 use crate::tests::{Circuit, Normal, Spot, spot, volts};
-use crate::unknown::Detector;
 use crate::vector::{PARAMETERS, Vector};
 use crate::{Frame, Says, Table};
 

@@ -4,9 +4,10 @@
 //!
 //! - [`table`]: the format, and its reader; [`Contents`] writes it
 //! - [`spline`]: what its fields are interpolated with
-//! - `circuit`: readings of a few contacts, and their derivatives
+//! - `loaded`, `circuit`: readings of a few contacts, and their derivatives
 //! - `normal`, `posterior`, `fit`: least squares
-//! - `unknown`, `patterns`: what is not known of a detector, and what it changes; `local`, `held`, `round`: fits with it
+//! - `unknown`, `moved`, `detector`: what is not known of a detector, and how it is after steps
+//! - `patterns`, `local`, `held`, `round`: what that changes in readings, and fits with it
 //! - `evidence`: which of two explanations is believed
 //! - `scan`, `beside`, `births`: where a first contact may be, and one more, on a detector that is known or not
 //! - `search`: what explains a frame that what was followed does not
@@ -28,6 +29,7 @@ mod births;
 mod circuit;
 mod contents;
 mod crc;
+mod detector;
 mod disc;
 mod evidence;
 mod fields;
@@ -41,7 +43,9 @@ mod kept;
 mod lanes;
 #[cfg(test)]
 mod laws;
+mod loaded;
 mod local;
+mod moved;
 mod normal;
 mod patterns;
 mod posterior;

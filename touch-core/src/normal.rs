@@ -1,6 +1,7 @@
 //! Normal equations of contacts, summed up row by row of a frame, and steps by them.
 
 use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::frame::{Errors, Frame, Says, left_v};
 use crate::held::{Held, Projected};
 use crate::local::Sorted;
@@ -9,7 +10,6 @@ use crate::products::dot;
 use crate::real::Real;
 use crate::slopes::RowSlopes;
 use crate::table::MAX_ELECTRODES;
-use crate::unknown::Detector;
 use crate::vector::{Matrix, PARAMETERS, Vector};
 
 /// Which parameter of a contact is that of its resistance.

@@ -10,13 +10,14 @@
 //! fields change is their resistance's, which is fitted, and their moment's. Of what drives a couple, the change of the field's slope between contacts is left out.
 
 use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::fields::Stencil;
 use crate::lanes::at_once;
 use crate::local::Sorted;
 use crate::products::{add, dot};
 use crate::real::Real;
 use crate::table::{MAX_ELECTRODES, MAX_KNOTS};
-use crate::unknown::{Change, Detector, Direction, Fields, Unknown, of_pair, pairs};
+use crate::unknown::{Change, Direction, Fields, Unknown, of_pair, pairs};
 
 /// The readings of contacts, with what their changes need.
 pub(crate) struct Patterns<'a, T, const K: usize> {

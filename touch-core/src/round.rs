@@ -9,6 +9,7 @@ mod on;
 pub(crate) use self::on::On;
 use crate::births::Births;
 use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::evidence::{information, known, ln_volume, loose};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
 use crate::frame::{Errors, left_v};
@@ -18,7 +19,7 @@ use crate::real::Real;
 use crate::scan::Candidates;
 use crate::solver::Task;
 use crate::table::Table;
-use crate::unknown::{Detector, Unknown};
+use crate::unknown::Unknown;
 use crate::vector::{PARAMETERS, Vector};
 
 /// Steps of contacts in a round.

@@ -4,9 +4,9 @@
 //! Loads are had from the readings alone but for a factor, as `Z` is symmetric: `r[g][e] D[g] = r[e][g] D[e]` with `r = 1 - V / Vcc`. So the
 //! scalar product with the pattern of a place is a sum over electrodes, and a look costs some dozen multiplications.
 
-use crate::circuit::{PerElectrode, Spot};
 use crate::fit::{Working, held_ohm};
 use crate::frame::Frame;
+use crate::loaded::{PerElectrode, Spot};
 use crate::real::Real;
 use crate::solver::Task;
 use crate::table::{MAX_ELECTRODES, Table};

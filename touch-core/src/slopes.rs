@@ -1,8 +1,9 @@
 //! Derivatives of readings by the parameters of contacts.
 
-use crate::circuit::{Circuit, Loaded, PerElectrode, TURNED};
+use crate::circuit::Circuit;
 use crate::head::Head;
 use crate::lanes::at_once;
+use crate::loaded::{Loaded, PerElectrode, TURNED};
 use crate::real::Real;
 use crate::table::MAX_ELECTRODES;
 use crate::vector::{PARAMETERS, Vector};

@@ -4,16 +4,16 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
+use crate::detector::Detector;
 use crate::frame::Errors;
 use crate::normal::ANY_RADIUS;
 use crate::samples::{seal, table};
 use crate::table::MAX_ELECTRODES;
-use crate::unknown::Detector;
 use crate::vector::PARAMETERS;
 use crate::{BOARD_CONTACTS, Flags, Frame, FrameError, Says, Solver, Table, TableError};
 
 /// As on a board.
-pub(crate) type Spot = crate::circuit::Spot<f32>;
+pub(crate) type Spot = crate::loaded::Spot<f32>;
 pub(crate) type Circuit = crate::circuit::Circuit<f32, BOARD_CONTACTS>;
 pub(crate) type Normal = crate::normal::Normal<f32, BOARD_CONTACTS>;
 pub(crate) type Scene = crate::fit::Scene<f32, BOARD_CONTACTS, 0>;

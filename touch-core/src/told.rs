@@ -1,6 +1,7 @@
 //! What is told of contacts: their numbers, and an answer.
 
 use crate::answer::{Answer, Contact, Flags};
+use crate::detector::Detector;
 use crate::evidence::{freedom, is_misfit, known, limit};
 use crate::fit::{Fit, LN_RADII, LN_SQUARES, Scene};
 use crate::frame::Says;
@@ -8,7 +9,6 @@ use crate::posterior::Posterior;
 use crate::real::Real;
 use crate::solver::{Solver, Task};
 use crate::table::Table;
-use crate::unknown::Detector;
 use crate::walls::NearWalls;
 
 /// Conductance (sheet conductances) above which more would change nothing.

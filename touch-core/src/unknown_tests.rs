@@ -2,17 +2,20 @@
 
 use std::vec::Vec;
 
-use crate::circuit::{Circuit, Spot};
+use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::evidence::information;
 use crate::frame::{Errors, Frame};
 use crate::held::Held;
 use crate::lanes::Lanes;
+use crate::loaded::Spot;
 use crate::local::Sorted;
+use crate::moved::{Layout, Moved};
 use crate::normal::{ANY_RADIUS, Normal};
 use crate::samples::{CELLS, KNOTS, fields_ohm, grid_m, table};
 use crate::solver::Solver;
 use crate::table::Table;
-use crate::unknown::{Change, Detector, Direction, Layout, Moved, Unknown, pairs};
+use crate::unknown::{Change, Direction, Unknown, pairs};
 use crate::vector::Vector;
 use crate::{Answer, Room};
 

@@ -1,12 +1,14 @@
 //! A frame of a detector that is not known, and where it is worked out.
 
 use crate::circuit::Circuit;
+use crate::detector::Detector;
 use crate::fit::Scene;
 use crate::frame::left_v;
 use crate::held::{Held, Parts};
+use crate::moved::Layout;
 use crate::real::Real;
 use crate::solver::Task;
-use crate::unknown::{Detector, Layout, Unknown};
+use crate::unknown::Unknown;
 
 /// What rounds are gone with.
 pub(crate) struct On<'a, 't, T, const K: usize> {

@@ -1,8 +1,8 @@
 //! Explanations that differ from one in a contact, and may be as good.
 
 use super::Search;
-use crate::circuit::Spot;
 use crate::fit::{Fit, LN_RADII, Scene};
+use crate::loaded::Spot;
 use crate::real::Real;
 
 /// What the readings say for a contact below which others may do as well without it (squared deviations). Of 400 scenes on `built205` and 200 on a detector that is known as many are

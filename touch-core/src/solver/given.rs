@@ -2,10 +2,10 @@
 
 use super::{Solver, Task};
 use crate::answer::Contact;
-use crate::circuit::Spot;
 use crate::fit::{Bench, Scene, Went, Working};
 use crate::frame::{Frame, FrameError};
 use crate::held::Room;
+use crate::loaded::Spot;
 use crate::normal::ANY_RADIUS;
 use crate::real::Real;
 use crate::table::Table;
