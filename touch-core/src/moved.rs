@@ -95,6 +95,8 @@ impl Layout {
         own.copy_from_slice(&steps[..self.directions]);
         let (pads, walls) = (&mut all_pads[..pairs(n)], &mut all_walls[..pairs(n + 1)]);
         table.parts([&mut *pads, &mut *distances, &mut *walls]);
+        lows_v.fill(T::ZERO);
+        per_v.fill(T::ONE);
         for ((low, per_v), [low_v, high_v]) in lows_v.iter_mut().zip(&mut *per_v).zip(unknown.ranges_v) {
             (*low, *per_v) = (T::of(*low_v), T::ONE / (T::of(*high_v) - T::of(*low_v)));
         }
