@@ -11,7 +11,6 @@ use crate::fit::{Working, held_ohm};
 use crate::held::Held;
 use crate::lanes::at_once;
 use crate::loaded::{PerElectrode, Spot};
-use crate::local::Sorted;
 use crate::normal::Normal;
 use crate::posterior::Factor;
 use crate::products::dot;
@@ -65,7 +64,7 @@ impl<T: Real> Sums<T> {
 
     /// Scalar product of what is left with a place's change, and the square of that.
     #[inline(always)]
-    fn along_and_square(&self, held: &Held<'_, T>, potentials_ohm: &[T]) -> (T, T) {
+    fn along_and_square<const D: usize>(&self, held: &Held<'_, T, D>, potentials_ohm: &[T]) -> (T, T) {
         let count = T::of(potentials_ohm.len() as u32);
         // As differences, of which the large constant of a light contact takes no digits.
         let mean_ohm = potentials_ohm.iter().copied().sum::<T>() / count;
@@ -92,8 +91,7 @@ pub(crate) struct Births<'a, 'h, T, const K: usize, const D: usize> {
     pub detector: &'a Detector<'a, T>,
     pub circuit: &'a Circuit<T, K>,
     pub normal: &'a Normal<T, K>,
-    pub held: &'a mut Held<'h, T>,
-    pub sorted: &'a Sorted<D>,
+    pub held: &'a mut Held<'h, T, D>,
     /// What is taken for noise (V), and how much more that is than noise is.
     pub noise_v: T,
     pub tau: T,
@@ -103,7 +101,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
     /// Takes the best places; none where the contacts are not determined.
     pub fn look(&mut self, best: &mut Candidates<T>, work: &mut Working<'_, K>) {
         let Some(factor) = Factor::of(self.normal, T::of(DAMPING)) else { return };
-        self.held.whiten(self.sorted);
+        self.held.whiten();
         let table = self.task.table;
         let n = table.electrodes();
         let mut change = [T::ZERO; MAX_ELECTRODES * MAX_ELECTRODES];
@@ -254,7 +252,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
     fn new_square(&mut self, change: &[T], factor: &Factor<T, K>) -> T {
         let all = dot(change, change);
         let mut shared = Vector::<T, K>::ZERO;
-        let by_detector = self.held.shared(self.sorted, change, &mut shared[..self.normal.count]);
+        let by_detector = self.held.shared(change, &mut shared[..self.normal.count]);
         (all - by_detector - factor.square(shared)).max(T::of(LEAST_NEW) * all)
     }
 }

@@ -5,7 +5,6 @@ use crate::detector::Detector;
 use crate::evidence::{information, known, ln_volume};
 use crate::held::Room;
 use crate::loaded::Spot;
-use crate::local::Sorted;
 use crate::normal::Normal;
 use crate::real::Real;
 use crate::round::OnUnknown;
@@ -245,7 +244,6 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     pub(crate) worth: T,
     /// What is not known of a detector, and the scene whose patterns are held.
     pub(crate) on: OnUnknown<T>,
-    pub(crate) sorted: Sorted<D>,
     pub(crate) held_at: Scene<T, K, D>,
     /// Whether it goes on from the frame before; the last fit whose derivatives were taken where it ended, and what was to become least in it.
     pub(crate) goes_on: bool,
@@ -268,7 +266,6 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         is_derived: false,
         worth: T::ZERO,
         on: OnUnknown::NONE,
-        sorted: Sorted::NONE,
         held_at: Scene::EMPTY,
         goes_on: false,
         ended: Fit::NONE,

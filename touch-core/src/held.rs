@@ -34,12 +34,12 @@ pub struct Room<'m, T> {
 }
 
 /// Parts of the room.
-pub(crate) struct Parts<'m, T> {
+pub(crate) struct Parts<'m, T, const D: usize> {
     /// For the detector.
     pub moved: &'m mut [T],
     pub shares: &'m mut [f32],
     /// For the patterns.
-    pub held: Held<'m, T>,
+    pub held: Held<'m, T, D>,
 }
 
 impl<T: Real> Room<'_, T> {
@@ -53,7 +53,12 @@ impl<T: Real> Room<'_, T> {
         unknown.tables * (1 + pairs(contacts - 1)) + contacts * unknown.of_place(table.electrodes())
     }
 
-    pub(crate) fn parts(&mut self, table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> Parts<'_, T> {
+    pub(crate) fn parts<const D: usize>(
+        &mut self,
+        table: &Table<'_>,
+        unknown: &Unknown<'_>,
+        contacts: usize,
+    ) -> Parts<'_, T, D> {
         let (moved, mut rest) = self.numbers.split_at_mut(Layout::of(table, unknown).numbers());
         let [
             there_v,
@@ -78,6 +83,7 @@ impl<T: Real> Room<'_, T> {
         let (fields, floats) = floats.split_at_mut(contacts * unknown.of_place(table.electrodes()));
         let between_ohm = &mut floats[..unknown.tables * pairs(contacts - 1)];
         let held = Held {
+            sorted: Sorted::of(unknown),
             fields,
             between_ohm,
             there_v,
@@ -120,7 +126,8 @@ fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 
 
 /// Patterns that are held.
 #[derive(Debug)]
-pub(crate) struct Held<'m, T> {
+pub(crate) struct Held<'m, T, const D: usize> {
+    sorted: Sorted<D>,
     /// What each table changes at contacts, and between them.
     fields: &'m mut [f32],
     between_ohm: &'m mut [f32],
@@ -164,11 +171,10 @@ impl<T: Real> Projected<'_, T> {
     }
 }
 
-impl<T: Real> Held<'_, T> {
+impl<T: Real, const D: usize> Held<'_, T, D> {
     /// Takes the patterns of contacts that were read, in noise of a deviation (V), of those readings that say something.
-    pub fn hold<const K: usize, const D: usize>(
+    pub fn hold<const K: usize>(
         &mut self,
-        sorted: &Sorted<D>,
         detector: &Detector<'_, T>,
         unknown: &Unknown<'_>,
         circuit: &mut Circuit<T, K>,
@@ -177,7 +183,7 @@ impl<T: Real> Held<'_, T> {
     ) {
         circuit.derive(detector.table);
         Patterns::new(detector, unknown, circuit, self.there_v, self.fields, self.between_ohm).write(
-            sorted,
+            &self.sorted,
             self.patterns,
             self.left,
         );
@@ -186,21 +192,23 @@ impl<T: Real> Held<'_, T> {
         }
         let (n, readings) = (detector.table.electrodes(), self.there_v.len());
         turn(self.left, n, self.turned);
-        let (common, layers) = self.patterns.split_at_mut(sorted.commons * readings);
+        let (common, layers) = self.patterns.split_at_mut(self.sorted.commons * readings);
         let rows = common.chunks_exact_mut(readings).map(|row| (row, &*self.left));
-        let pairs = layers.chunks_exact_mut(2 * readings).take(sorted.layers).map(|pair| pair.split_at_mut(readings));
+        let pairs =
+            layers.chunks_exact_mut(2 * readings).take(self.sorted.layers).map(|pair| pair.split_at_mut(readings));
         let pairs = pairs.flat_map(|(down, across)| [(down, &*self.left), (across, &*self.turned)]);
         for (row, scales) in rows.chain(pairs) {
             row.iter_mut().zip(scales).for_each(|(value, scale)| *value *= *scale);
         }
-        self.multiply(sorted);
+        self.multiply();
     }
 
     /// Notes products of the patterns with each other.
-    fn multiply<const D: usize>(&mut self, sorted: &Sorted<D>) {
-        let (readings, count) = (self.there_v.len(), sorted.count);
+    fn multiply(&mut self) {
+        let readings = self.there_v.len();
         let n = readings.isqrt();
-        let Self { patterns, factor, squares, turned, .. } = self;
+        let Self { sorted, patterns, factor, squares, turned, .. } = self;
+        let count = sorted.count;
         let (common, mut locals) = split(patterns, turned, sorted, readings);
         let factor = &mut factor[..count * count];
         // In the triangle below the factor.
@@ -243,7 +251,8 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// Takes what is held to so many times the noise.
-    pub fn rescale(&mut self, count: usize, times: T) {
+    pub fn rescale(&mut self, times: T) {
+        let count = self.sorted.count;
         let (per_time, per_square) = (T::ONE / times, T::ONE / (times * times));
         self.patterns.iter_mut().for_each(|value| *value *= per_time);
         self.squares[..count].iter_mut().for_each(|square| *square *= per_square);
@@ -253,7 +262,8 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// Factorises `I + p' p`, or where steps are damped with more than one in place of `I`; `None` if it makes no sense.
-    pub fn factorise(&mut self, count: usize, damping: T) -> Option<()> {
+    pub fn factorise(&mut self, damping: T) -> Option<()> {
+        let count = self.sorted.count;
         let Self { factor, squares, .. } = self;
         let factor = &mut factor[..count * count];
         for i in 0..count {
@@ -289,8 +299,8 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// Squares of what is left, at least, with those of the steps of the detector that leave it.
-    pub fn least<const D: usize>(&mut self, sorted: &Sorted<D>) -> T {
-        self.project_left(sorted);
+    pub fn least(&mut self) -> T {
+        self.project_left();
         dot(self.left, self.left) + self.projected().less()
     }
 
@@ -302,15 +312,15 @@ impl<T: Real> Held<'_, T> {
 
     /// The pattern of a direction, in noise.
     #[cfg(test)]
-    pub fn pattern<const D: usize>(&self, sorted: &Sorted<D>, direction: usize) -> std::vec::Vec<T> {
-        crate::local::pattern(sorted, self.patterns, self.there_v.len(), direction)
+    pub fn pattern(&self, direction: usize) -> std::vec::Vec<T> {
+        crate::local::pattern(&self.sorted, self.patterns, self.there_v.len(), direction)
     }
 
     /// Ends the look at contacts of so many parameters: products of what is left, and of the derivatives, with the patterns are projected.
-    pub fn project<const D: usize>(&mut self, sorted: &Sorted<D>, parameters: usize) {
-        self.project_left(sorted);
-        let (readings, count) = (self.left.len(), sorted.count);
-        let Self { patterns, slopes, columns, factor, turned, .. } = self;
+    pub fn project(&mut self, parameters: usize) {
+        self.project_left();
+        let (readings, count) = (self.left.len(), self.sorted.count);
+        let Self { sorted, patterns, slopes, columns, factor, turned, .. } = self;
         let slopes = &slopes[..readings * parameters];
         let (common, mut locals) = split(patterns, turned, sorted, readings);
         T::products(slopes, common, readings, false, |which, place, product| {
@@ -328,8 +338,8 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// The same of what is left alone.
-    pub fn project_left<const D: usize>(&mut self, sorted: &Sorted<D>) {
-        let Self { patterns, left, products, factor, turned, .. } = self;
+    pub fn project_left(&mut self) {
+        let Self { sorted, patterns, left, products, factor, turned, .. } = self;
         let (common, mut locals) = split(patterns, turned, sorted, left.len());
         multiplied(sorted, common, &mut locals, left, products);
         at_once(
@@ -360,9 +370,9 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// Takes what the detector's posterior mean explains from what the last look left.
-    pub fn whiten<const D: usize>(&mut self, sorted: &Sorted<D>) {
+    pub fn whiten(&mut self) {
         self.take();
-        let Self { taken, patterns, left, factor, turned, .. } = self;
+        let Self { sorted, taken, patterns, left, factor, turned, .. } = self;
         backward(factor, sorted.count, taken);
         let readings = left.len();
         let (common, locals) = split(patterns, turned, sorted, readings);
@@ -378,9 +388,9 @@ impl<T: Real> Held<'_, T> {
     }
 
     /// The part of a change's square, in noise, that steps of the detector could do as well; and its products with the derivatives but for what these do too.
-    pub fn shared<const D: usize>(&mut self, sorted: &Sorted<D>, change: &[T], shared: &mut [T]) -> T {
-        let (readings, count) = (change.len(), sorted.count);
-        let Self { patterns, slopes, columns, taken, factor, turned, .. } = self;
+    pub fn shared(&mut self, change: &[T], shared: &mut [T]) -> T {
+        let (readings, count) = (change.len(), self.sorted.count);
+        let Self { sorted, patterns, slopes, columns, taken, factor, turned, .. } = self;
         let (common, mut locals) = split(patterns, turned, sorted, readings);
         multiplied(sorted, common, &mut locals, change, taken);
         T::products(change, &slopes[..readings * shared.len()], readings, false, |_, which, product| {

@@ -22,7 +22,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     /// The fit of a frame by the gain that is kept; `None` where there is none, or it does not serve.
     pub(crate) fn by_kept_gain(
         &mut self,
-        on: &mut On<'_, '_, T, K>,
+        on: &mut On<'_, '_, T, K, D>,
         work: &mut Working<'_, K>,
     ) -> Option<Fit<T, K, D>> {
         let table = on.task.table;
@@ -52,7 +52,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     /// Whether derivatives are those of contacts of a scene, near enough: where patterns serve too, or within what is known of them.
-    fn has_gain_near(&self, scene: &Scene<T, K, D>, on: &On<'_, '_, T, K>) -> bool {
+    fn has_gain_near(&self, scene: &Scene<T, K, D>, on: &On<'_, '_, T, K, D>) -> bool {
         let table = on.task.table;
         if scene.is_near(&self.ended.scene, T::of(NEAR), table) {
             return true;
@@ -64,10 +64,10 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     /// Sums up what the contacts that were read last leave of a frame.
-    fn leave(&self, on: &mut On<'_, '_, T, K>, normal: &mut Normal<T, K>) {
+    fn leave(&self, on: &mut On<'_, '_, T, K, D>, normal: &mut Normal<T, K>) {
         let Task { table, frame, errors, .. } = on.task;
         let held = &mut on.parts.held;
         held.leave(frame, T::of(table.head().full_v), errors.variance_v2.sqrt());
-        normal.sum_up_left(on.circuit, self.radius_deviation, (held, &self.sorted));
+        normal.sum_up_left(on.circuit, self.radius_deviation, held);
     }
 }

@@ -4,7 +4,6 @@ use crate::circuit::Circuit;
 use crate::detector::Detector;
 use crate::frame::{Errors, Frame, Says, left_v};
 use crate::held::{Held, Projected};
-use crate::local::Sorted;
 use crate::posterior::{Factor, Posterior};
 use crate::products::dot;
 use crate::real::Real;
@@ -113,7 +112,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
         frame: &Frame<'_, T>,
         noise_v: T,
         radius_deviation: T,
-        (held, sorted): (&mut Held<'_, T>, &Sorted<D>),
+        held: &mut Held<'_, T, D>,
     ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         circuit.derive(detector.table);
@@ -144,7 +143,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
             }
         }
         held.leave(frame, T::of(head.full_v), noise_v);
-        held.project(sorted, self.count);
+        held.project(self.count);
         self.cost = dot(held.left(), held.left());
         held.products(self.count, |i, j, product| self.matrix[i][j] = product, |i, product| self.pull[i] = product);
         let projected = held.projected();
@@ -158,9 +157,9 @@ impl<T: Real, const K: usize> Normal<T, K> {
         &mut self,
         circuit: &Circuit<T, K>,
         radius_deviation: T,
-        (held, sorted): (&mut Held<'_, T>, &Sorted<D>),
+        held: &mut Held<'_, T, D>,
     ) {
-        held.project_left(sorted);
+        held.project_left();
         self.cost = dot(held.left(), held.left());
         held.products_with_left(self.count, |i, product| self.pull[i] = product);
         self.leave_out(&held.projected());

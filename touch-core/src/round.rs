@@ -14,7 +14,6 @@ use crate::evidence::{information, known, ln_volume, loose};
 use crate::fit::{Fit, Fitting, LEAST_GAIN, Scene, TRIES, Went, Working};
 use crate::frame::{Errors, left_v};
 use crate::held::{Held, Room};
-use crate::local::Sorted;
 use crate::real::Real;
 use crate::scan::Candidates;
 use crate::solver::Task;
@@ -95,31 +94,30 @@ impl<T: Real> OnUnknown<T> {
     /// Holds the patterns of contacts that are solved and read, in what is taken for noise, of those readings that say something; `None` if they make no sense.
     fn hold<const K: usize, const D: usize>(
         &mut self,
-        sorted: &Sorted<D>,
         Task { table, frame, errors, unknown }: Task<'_, T>,
         detector: &Detector<'_, T>,
         circuit: &mut Circuit<T, K>,
-        held: &mut Held<'_, T>,
+        held: &mut Held<'_, T, D>,
     ) -> Option<()> {
         let full_v = T::of(table.head().full_v);
         let says = |index: usize, read_v: T| left_v(frame, index, full_v, read_v).is_some();
-        held.hold(sorted, detector, unknown?, circuit, self.tau * errors.variance_v2.sqrt(), says);
+        held.hold(detector, unknown?, circuit, self.tau * errors.variance_v2.sqrt(), says);
         self.held_in = [self.tau, self.damping];
-        self.factorise(held, sorted.count)
+        self.factorise(held)
     }
 
     /// Takes what is held to what is taken for noise now, and to the weight that there is now; `None` if it makes no sense.
-    fn weigh(&mut self, held: &mut Held<'_, T>, count: usize) -> Option<()> {
+    fn weigh<const D: usize>(&mut self, held: &mut Held<'_, T, D>) -> Option<()> {
         let [tau, _] = core::mem::replace(&mut self.held_in, [self.tau, self.damping]);
         if tau != self.tau {
-            held.rescale(count, self.tau / tau);
+            held.rescale(self.tau / tau);
         }
-        self.factorise(held, count)
+        self.factorise(held)
     }
 
     /// Patterns are held if they make sense.
-    fn factorise(&mut self, held: &mut Held<'_, T>, count: usize) -> Option<()> {
-        let factorised = held.factorise(count, self.damping);
+    fn factorise<const D: usize>(&mut self, held: &mut Held<'_, T, D>) -> Option<()> {
+        let factorised = held.factorise(self.damping);
         self.is_held = factorised.is_some();
         factorised
     }
@@ -222,12 +220,13 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         best: &mut Candidates<T>,
         work: &mut Working<'_, K>,
     ) {
-        let mut on = On { task, unknown, circuit, parts: room.parts(task.table, unknown, K), is_moved: false };
+        let parts = room.parts::<D>(task.table, unknown, K);
+        let mut on = On { task, unknown, circuit, parts, is_moved: false };
         let (detector, circuit, held) = on.there();
         circuit.derive(task.table);
-        let (tau, normal, sorted) = (self.on.tau, &self.normal, &self.sorted);
+        let (tau, normal) = (self.on.tau, &self.normal);
         let noise_v = tau * task.errors.variance_v2.sqrt();
-        Births { task, detector: &detector, circuit, normal, held, sorted, noise_v, tau }.look(best, work);
+        Births { task, detector: &detector, circuit, normal, held, noise_v, tau }.look(best, work);
         // What is left is whitened now.
         self.has_looked = false;
     }
@@ -238,7 +237,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     /// Finds how much is left of the readings where the fit begins, if that is not known; `false` if the scene makes no sense.
-    fn is_begun(&mut self, on: &mut On<'_, '_, T, K>) -> bool {
+    fn is_begun(&mut self, on: &mut On<'_, '_, T, K, D>) -> bool {
         if core::mem::replace(&mut self.has_looked, true) {
             return true;
         }
@@ -251,7 +250,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     /// Takes the derivatives of the scene with the detector's patterns held, unless they are there; `None` if it makes no sense.
-    fn derive(&mut self, on: &mut On<'_, '_, T, K>, work: &mut Working<'_, K>) -> Option<()> {
+    fn derive(&mut self, on: &mut On<'_, '_, T, K, D>, work: &mut Working<'_, K>) -> Option<()> {
         if self.is_derived {
             return Some(());
         }
@@ -264,10 +263,10 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let near = if self.on.tau > T::ONE { NEAR_IN_MISFIT } else { NEAR };
         if self.on.is_held && self.scene.is_near(&self.held_at, T::of(near), task.table) {
             if self.on.held_in != [self.on.tau, self.on.damping] {
-                self.on.weigh(held, self.sorted.count)?;
+                self.on.weigh(held)?;
             }
         } else {
-            self.on.hold(&self.sorted, task, &detector, circuit, held)?;
+            self.on.hold(task, &detector, circuit, held)?;
             self.held_at = self.scene;
         }
         held.set_state(&self.scene.steps);
@@ -279,7 +278,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     /// Steps contacts with the detector's patterns held, and takes it to its posterior's mean; `None` if that is not worth it.
     fn step_contacts(
         &mut self,
-        on: &mut On<'_, '_, T, K>,
+        on: &mut On<'_, '_, T, K, D>,
         before: T,
         work: &mut Working<'_, K>,
     ) -> Option<Scene<T, K, D>> {
@@ -320,7 +319,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     /// What contacts leave at least on any detector, in the linear theory of the patterns that are held.
-    fn left_by(&mut self, scene: &Scene<T, K, D>, on: &mut On<'_, '_, T, K>) -> Option<T> {
+    fn left_by(&mut self, scene: &Scene<T, K, D>, on: &mut On<'_, '_, T, K, D>) -> Option<T> {
         (self.is_solved, self.is_derived, on.is_moved) = (false, false, true);
         let makes_sense = on.read(scene);
         on.is_moved = false;
@@ -329,24 +328,23 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         }
         let Task { table, frame, errors, .. } = on.task;
         on.parts.held.leave(frame, T::of(table.head().full_v), self.on.tau * errors.variance_v2.sqrt());
-        let left = on.parts.held.least(&self.sorted);
+        let left = on.parts.held.least();
         let objective = left + prior_of_radii(scene, self.radius_deviation_in(self.on.tau));
         Some(objective).filter(|objective| objective.is_finite())
     }
 
     /// Sums up what contacts that were read leave, with its derivatives.
-    fn sum_up(&mut self, on: &mut On<'_, '_, T, K>, work: &mut Working<'_, K>) {
+    fn sum_up(&mut self, on: &mut On<'_, '_, T, K, D>, work: &mut Working<'_, K>) {
         let (frame, noise_v) = (on.task.frame, self.on.tau * on.task.errors.variance_v2.sqrt());
         let radius_deviation = self.radius_deviation_in(self.on.tau);
         let (detector, circuit, held) = on.there();
-        let held_on = (&mut *held, &self.sorted);
-        self.normal.sum_up_held(&detector, circuit, frame, noise_v, radius_deviation, held_on);
+        self.normal.sum_up_held(&detector, circuit, frame, noise_v, radius_deviation, held);
         held.take();
         work.worked_out(circuit.count);
     }
 
     /// Goes as far on the way to a scene as the readings agree to: which share of it.
-    fn go_towards(&mut self, to: &Scene<T, K, D>, on: &mut On<'_, '_, T, K>) -> T {
+    fn go_towards(&mut self, to: &Scene<T, K, D>, on: &mut On<'_, '_, T, K, D>) -> T {
         self.is_derived = false;
         for share in [T::ONE, T::of(SHORTER)] {
             let there = self.scene.towards(to, share);
@@ -383,7 +381,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     }
 
     /// The fit, with the derivatives where it ended.
-    fn end_round(&mut self, on: &mut On<'_, '_, T, K>, work: &mut Working<'_, K>) -> Option<Fit<T, K, D>> {
+    fn end_round(&mut self, on: &mut On<'_, '_, T, K, D>, work: &mut Working<'_, K>) -> Option<Fit<T, K, D>> {
         let table = on.task.table;
         self.is_derived &= self.on.damping == T::ONE;
         self.on.damping = T::ONE;

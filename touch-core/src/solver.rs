@@ -15,7 +15,6 @@ use crate::evidence::{freedom, is_misfit, is_nothing, limit, score, weakest};
 use crate::fit::{Bench, Fit, Fitting, Scene, Went, Work, Working};
 use crate::frame::{Errors, Frame, FrameError};
 use crate::held::Room;
-use crate::local::Sorted;
 use crate::normal::ANY_RADIUS;
 use crate::real::Real;
 use crate::scan::{first, no_candidates};
@@ -259,7 +258,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     ) -> Result<Option<Answer<T, K>>, FrameError> {
         frame.check(table)?;
         let (frame, left_out) = frame.without_broken(table);
-        let errors = self.errors_of(&frame, table, unknown);
+        let errors = self.errors_of(&frame, table, unknown.is_some());
         let task = Task { table, frame: &frame, errors: &errors, unknown };
         if self.stage == Stage::Idle {
             (self.stage, self.work) = (Stage::Followed, Work::NONE);
@@ -276,14 +275,13 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
     }
 
     /// What is known of a frame's errors. Where one begins, it is found whether patterns are held on.
-    fn errors_of(&mut self, frame: &Frame<'_, T>, table: &Table<'_>, unknown: Option<&Unknown<'_>>) -> Errors<T> {
+    fn errors_of(&mut self, frame: &Frame<'_, T>, table: &Table<'_>, is_unknown: bool) -> Errors<T> {
         let mut errors = Errors::of(frame, table);
-        if unknown.is_some() {
+        if is_unknown {
             // Pads are among what is not known.
             errors.pads.fill(T::ZERO);
         }
         if self.stage == Stage::Idle {
-            self.fitting.sorted = unknown.map_or(Sorted::NONE, Sorted::of);
             self.fitting.on.begin_frame(&mut errors, frame.volts.len());
         }
         errors

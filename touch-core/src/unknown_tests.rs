@@ -144,7 +144,11 @@ fn scenes() -> [Vec<Spot<f64>>; 2] {
 const STEPS: [f64; DIRECTIONS] = [0.8, -1.1, 0.5, -0.7, 1.2, 0.4, -0.9, 0.6];
 
 /// The parts of a room that what is held needs.
-fn with_held<R>(unknown: &Unknown<'_>, table: &Table<'_>, function: impl FnOnce(&mut Held<'_, f64>) -> R) -> R {
+fn with_held<R>(
+    unknown: &Unknown<'_>,
+    table: &Table<'_>,
+    function: impl FnOnce(&mut Held<'_, f64, DIRECTIONS>) -> R,
+) -> R {
     let mut numbers = std::vec![0.0; Room::<f64>::numbers(table, unknown, 3)];
     let mut floats = std::vec![0.0; Room::<f64>::floats(table, unknown, 3)];
     let mut room = Room { numbers: &mut numbers, floats: &mut floats };
@@ -209,17 +213,16 @@ fn the_sum_of_squares_is_that_of_the_posteriors_mean() {
                 assert!(circuit.solve(detector, spots));
                 held.read(detector, &circuit);
                 // Whether they are held in it, or were in another noise.
-                let sorted = Sorted::<DIRECTIONS>::of(unknown);
-                held.hold(&sorted, detector, unknown, &mut circuit, 3.0 * noise_v, |_, _| true);
-                held.rescale(DIRECTIONS, 1.0 / 3.0);
-                held.factorise(DIRECTIONS, 1.0).unwrap();
+                held.hold(detector, unknown, &mut circuit, 3.0 * noise_v, |_, _| true);
+                held.rescale(1.0 / 3.0);
+                held.factorise(1.0).unwrap();
                 held.set_state(&at);
                 let mut normal = Normal::EMPTY;
-                normal.sum_up_held(detector, &mut circuit, &frame, noise_v, f64::from(ANY_RADIUS), (held, &sorted));
+                normal.sum_up_held(detector, &mut circuit, &frame, noise_v, f64::from(ANY_RADIUS), held);
                 held.take();
                 let mut mean = at;
                 held.posterior(&mut mean);
-                let patterns: Vec<Vec<f64>> = (0..DIRECTIONS).map(|k| held.pattern(&sorted, k)).collect();
+                let patterns: Vec<Vec<f64>> = (0..DIRECTIONS).map(|k| held.pattern(k)).collect();
                 let predicted = read_v(&table, &made_up, at, spots);
                 let left = |steps: &[f64; DIRECTIONS]| {
                     let of_reading = |index: usize| {

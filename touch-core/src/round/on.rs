@@ -11,18 +11,18 @@ use crate::solver::Task;
 use crate::unknown::Unknown;
 
 /// What rounds are gone with.
-pub(crate) struct On<'a, 't, T, const K: usize> {
+pub(crate) struct On<'a, 't, T, const K: usize, const D: usize> {
     pub task: Task<'t, T>,
     pub unknown: &'t Unknown<'t>,
     pub circuit: &'a mut Circuit<T, K>,
-    pub parts: Parts<'a, T>,
+    pub parts: Parts<'a, T, D>,
     /// Whether the detector stays as it was worked out last.
     pub is_moved: bool,
 }
 
-impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
+impl<'a, T: Real, const K: usize, const D: usize> On<'a, '_, T, K, D> {
     /// The detector, circuit and readings as they were worked out last.
-    pub fn there(&mut self) -> (Detector<'_, T>, &mut Circuit<T, K>, &mut Held<'a, T>) {
+    pub fn there(&mut self) -> (Detector<'_, T>, &mut Circuit<T, K>, &mut Held<'a, T, D>) {
         let table = self.task.table;
         let Parts { moved, shares, held } = &mut self.parts;
         let moved = Layout::of(table, self.unknown).as_moved(moved, shares);
@@ -30,7 +30,7 @@ impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
     }
 
     /// Solves a scene on its detector and notes what is there to be read, and what channels make of it; `false` if it makes no sense.
-    pub fn read<const D: usize>(&mut self, scene: &Scene<T, K, D>) -> bool {
+    pub fn read(&mut self, scene: &Scene<T, K, D>) -> bool {
         let table = self.task.table;
         if !self.is_moved {
             let Parts { moved, shares, .. } = &mut self.parts;
@@ -45,7 +45,7 @@ impl<'a, T: Real, const K: usize> On<'a, '_, T, K> {
     }
 
     /// Squares of what a scene leaves of the readings, in noise.
-    pub fn left<const D: usize>(&mut self, scene: &Scene<T, K, D>) -> Option<T> {
+    pub fn left(&mut self, scene: &Scene<T, K, D>) -> Option<T> {
         if !self.read(scene) {
             return None;
         }

@@ -46,7 +46,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         frame.check(table)?;
         self.reset();
         let (frame, _) = frame.without_broken(table);
-        let errors = self.errors_of(&frame, table, Some(unknown));
+        let errors = self.errors_of(&frame, table, true);
         let task = Task { table, frame: &frame, errors: &errors, unknown: Some(unknown) };
         let scene = contacts.iter().fold(Scene::EMPTY, |scene, contact| scene.with(Spot::of(contact, table)));
         self.fit(scene, T::of(ANY_RADIUS), TO_THE_END);
