@@ -3,9 +3,13 @@
 use crate::head::Head;
 use crate::lanes::at_once;
 use crate::loaded::TURNED;
+use crate::products::add;
 use crate::real::Real;
 use crate::spline::weights;
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, OTHERS, QUANTITIES, RADII, Table};
+
+/// Numbers that a processor takes at once.
+const LANES: usize = 4;
 
 /// All quantities of a disc.
 #[derive(Clone, Debug)]
@@ -75,7 +79,9 @@ impl<'a> Table<'a> {
             #[inline(always)]
             || {
                 let stencil = Stencil::of(self, at_m);
-                let [small, large] = [0, 1].map(|which| self.of_radius(which, &stencil));
+                let mut sums = [[[T::ZERO; QUANTITIES]; 6]; RADII];
+                sums.iter_mut().enumerate().for_each(|(which, sums)| self.of_radius(which, &stencil, sums));
+                let [small, large] = &sums;
                 let between = |share: T, w: usize, q: usize| small[w][q] + share * (large[w][q] - small[w][q]);
                 for q in 0..self.electrodes + OTHERS {
                     let wider = |w: usize| large[w][q] - small[w][q];
@@ -91,15 +97,16 @@ impl<'a> Table<'a> {
 
     /// All quantities of a disc of one of the radii at a place, by each kind of weight.
     #[inline(always)]
-    fn of_radius<T: Real>(&self, which: usize, stencil: &Stencil<T>) -> [[T; QUANTITIES]; 6] {
+    fn of_radius<T: Real>(&self, which: usize, stencil: &Stencil<T>, sums: &mut [[T; QUANTITIES]; 6]) {
         let count = self.electrodes + OTHERS;
-        let mut sums = [[T::ZERO; QUANTITIES]; 6];
+        // In whole lanes: what is behind the quantities is nothing.
+        let whole = count.next_multiple_of(LANES).min(QUANTITIES);
         for (k, node) in stencil.nodes.into_iter().enumerate() {
             let codes = self.coefficient(node).get(which * count..(which + 1) * count).unwrap_or(&[]);
             let mut values = [T::ZERO; QUANTITIES];
             values.iter_mut().zip(codes).for_each(|(value, code)| *value = T::of(i16::from_le_bytes(*code)));
             for (sums, weights) in sums.iter_mut().zip(&stencil.weights) {
-                sums.iter_mut().zip(&values).take(count).for_each(|(sum, value)| *sum += weights[k] * *value);
+                add(&mut sums[..whole], weights[k], &values[..whole]);
             }
         }
         for q in 0..count {
@@ -108,7 +115,6 @@ impl<'a> Table<'a> {
             // Weights of the value sum up to one, those of derivatives to nothing.
             sums[0][q] += first;
         }
-        sums
     }
 
     /// What the code nought of a quantity stands for, and a step of codes.
