@@ -212,7 +212,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// Takes the places where one more contact would explain most of what those of the last fit leave among the best.
     pub(crate) fn births(
-        &mut self,
+        &self,
         task: Task<'_, T>,
         unknown: &Unknown<'_>,
         circuit: &mut Circuit<T, K>,
@@ -227,13 +227,6 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let (tau, normal) = (self.on.tau, &self.normal);
         let noise_v = tau * task.errors.variance_v2.sqrt();
         Births { task, detector: &detector, circuit, normal, held, noise_v, tau }.look(best, work);
-        // What is left is whitened now.
-        self.has_looked = false;
-    }
-
-    /// Whether the last fit ended there, with patterns and derivatives of this scene.
-    pub(crate) fn is_at(&self, scene: &Scene<T, K, D>, radius_deviation: T) -> bool {
-        self.has_looked && self.scene == *scene && self.radius_deviation == radius_deviation
     }
 
     /// Finds how much is left of the readings where the fit begins, if that is not known; `false` if the scene makes no sense.

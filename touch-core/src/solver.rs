@@ -311,7 +311,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
                 _ => Some(self.search.placed(readings)),
             },
             Piece::Beside(from) => {
-                let (fitting, starts) = (&mut self.fitting, &mut self.search.starts);
+                let (fitting, starts) = (&self.fitting, &mut self.search.starts);
                 if D > 0
                     && let (Some(unknown), Some(room)) = (task.unknown, &mut bench.room)
                 {
@@ -349,13 +349,8 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
             Wants::Fit(scene, radius_deviation, steps) => self.fit(scene, radius_deviation, steps),
             Wants::First => self.piece = Piece::First,
             Wants::Beside(scene, radius_deviation) => {
-                self.search.starts = no_candidates();
-                if task.unknown.is_some() && self.fitting.is_at(&scene, radius_deviation) {
-                    self.piece = Piece::Beside(0);
-                } else {
-                    self.fit(scene, radius_deviation, 0);
-                    self.piece = Piece::Others;
-                }
+                self.fit(scene, radius_deviation, 0);
+                (self.search.starts, self.piece) = (no_candidates(), Piece::Others);
             }
             Wants::Nothing(found) => return self.found(found, task),
         }
