@@ -9,7 +9,7 @@ use crate::spline::weights;
 use crate::table::{LEAST_SHARE, MAX_ELECTRODES, OTHERS, QUANTITIES, RADII, Table};
 
 /// Numbers that a processor takes at once.
-const LANES: usize = 4;
+const LANES: usize = if cfg!(feature = "wide") { 4 } else { 1 };
 
 /// All quantities of a disc.
 #[derive(Clone, Debug)]

@@ -66,7 +66,8 @@ pub(crate) struct Loaded<T> {
     pub ohm: T,
     /// Part of it that is on the detector.
     pub share: T,
-    /// Its radius (m).
+    /// How far its current spreads, and its radius (m).
+    spread_m: T,
     pub radius_m: T,
     /// Resistance without that of the crowded current (ohm).
     rest_ohm: T,
@@ -104,6 +105,7 @@ impl<T: Real> Loaded<T> {
         walls_ohm: [T::ZERO; MAX_ELECTRODES + 1],
         ohm: T::ZERO,
         share: T::ONE,
+        spread_m: T::ZERO,
         radius_m: T::ZERO,
         rest_ohm: T::ZERO,
         even_ohm: T::ZERO,
@@ -125,7 +127,12 @@ impl<T: Real> Loaded<T> {
     #[inline(always)]
     pub fn place(&mut self, detector: &Detector<'_, T>, spot: Spot<T>) {
         let (head, n) = (detector.table.head(), detector.table.electrodes());
-        let [wide, bent] = [T::ONE, T::of(BENT)].map(|share| way_to_wide(head, share, spread_m(head, &spot)));
+        self.spread_m = T::of(head.radius_m) * spot.ln_radius.exp();
+        let square_m2 = self.spread_m * self.spread_m;
+        let [small_m2, wide_m2] = head.radii_m.map(|radius_m| T::of(radius_m) * T::of(radius_m));
+        let per_m2 = T::ONE / (wide_m2 - small_m2);
+        self.per_ln_radius = T::of(2.0) * per_m2 * square_m2;
+        let [wide, bent] = [T::ONE, T::of(BENT)].map(|share| per_m2 * (share * square_m2 - small_m2));
         self.spot = spot;
         detector.table.sample(spot.at_m, wide, bent, &mut self.sample);
         self.described_ohm[..n].copy_from_slice(&self.sample.value[..n]);
@@ -136,11 +143,10 @@ impl<T: Real> Loaded<T> {
     #[inline(always)]
     pub fn load(&mut self, detector: &Detector<'_, T>) {
         let (head, n) = (detector.table.head(), detector.table.electrodes());
-        let spread_m = spread_m(head, &self.spot);
+        let spread_m = self.spread_m;
         detector.take(self.spot.at_m, &mut self.sample);
         self.share = self.sample.value[n + 1].clamp(T::of(LEAST_SHARE), T::ONE);
         self.ohm = self.spot.ln_ohm.exp().max(T::of(LEAST_OHM) * (self.sample.value[n] + head.even_ohm(spread_m)));
-        self.per_ln_radius = T::of(2.0) * (way_to_wide(head, T::ONE, spread_m) - way_to_wide(head, T::ZERO, spread_m));
         let disc = Disc::of(head, self.share, spread_m, self.sample.value[n], self.ohm);
         (self.radius_m, self.rest_ohm, self.even_ohm) = (disc.radius_m, disc.rest_ohm, head.even_ohm(disc.radius_m));
         (self.moment_s_m2, self.quadrupole_s_m4) = (disc.couple_s_m2, disc.quadrupole_s_m4);
@@ -152,7 +158,7 @@ impl<T: Real> Loaded<T> {
     #[inline(always)]
     pub fn derive(&mut self, head: &Head, n: usize) {
         let (ohm, own_ohm) = (self.ohm, self.sample.value[n]);
-        let spread_m = spread_m(head, &self.spot);
+        let spread_m = self.spread_m;
         let moments = [self.moment_s_m2, self.quadrupole_s_m4];
         let half_by = |other: Disc<T>, step: T| {
             let half = T::of(0.5) / step;
@@ -238,15 +244,4 @@ impl<T: Real> Loaded<T> {
         let pairs = (0..PARAMETERS).flat_map(|i| (0..PARAMETERS).map(move |j| (i, j)));
         pairs.fold(own * own, |sum, (i, j)| sum + slopes[i] * slopes[j] * covariance(i, j)).max(T::ZERO)
     }
-}
-
-/// How far a contact's current spreads (m).
-fn spread_m<T: Real>(head: &Head, spot: &Spot<T>) -> T {
-    T::of(head.radius_m) * spot.ln_radius.exp()
-}
-
-/// How far a disc whose radius' square is such a share of that of a spread is from the small to the wide one.
-fn way_to_wide<T: Real>(head: &Head, share: T, spread_m: T) -> T {
-    let [small_m2, wide_m2] = head.radii_m.map(|radius_m| T::of(radius_m) * T::of(radius_m));
-    (share * spread_m * spread_m - small_m2) / (wide_m2 - small_m2)
 }
