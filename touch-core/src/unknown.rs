@@ -112,13 +112,13 @@ impl Unknown<'_> {
     }
 
     /// How many numbers all tables have at a coefficient, and so at a place.
-    fn at_once(&self, electrodes: usize) -> usize {
+    fn numbers_at(&self, electrodes: usize) -> usize {
         self.common_tables() * (electrodes + 1) + self.electrodes.len()
     }
 
     /// Changes of all tables at a coefficient.
     fn node(&self, node: usize, electrodes: usize) -> &[f32] {
-        let count = self.at_once(electrodes);
+        let count = self.numbers_at(electrodes);
         self.fields_ohm.get(node * count..(node + 1) * count).unwrap_or(&[])
     }
 
@@ -155,13 +155,13 @@ impl Unknown<'_> {
 
     /// How many numbers it takes what all tables change at a place.
     pub(crate) fn of_place(&self, electrodes: usize) -> usize {
-        3 * self.at_once(electrodes)
+        3 * self.numbers_at(electrodes)
     }
 
     /// What all tables change at a place: fields, and their derivatives along x and y.
     #[inline(always)]
     pub(crate) fn all_at<T: Real>(&self, electrodes: usize, stencil: &Stencil<T>, all: &mut [f32]) {
-        let count = self.at_once(electrodes);
+        let count = self.numbers_at(electrodes);
         all.fill(0.0);
         for (index, node) in stencil.nodes.into_iter().enumerate() {
             let changes = self.node(node, electrodes);
@@ -174,7 +174,7 @@ impl Unknown<'_> {
     /// Those of the field of the electrode of a table that changes that alone.
     #[inline(always)]
     pub(crate) fn of_electrode<T: Real>(&self, electrodes: usize, which: usize, all: &[f32]) -> [T; 3] {
-        let (count, place) = (self.at_once(electrodes), self.common_tables() * electrodes + which);
+        let (count, place) = (self.numbers_at(electrodes), self.common_tables() * electrodes + which);
         core::array::from_fn(|part| T::of(all[part * count + place]))
     }
 
@@ -182,7 +182,7 @@ impl Unknown<'_> {
     #[inline(always)]
     pub(crate) fn of_table<T: Real>(&self, electrodes: usize, which: usize, all: &[f32], at: &mut Fields<T>) {
         let count = electrodes + 1;
-        let parts = all.chunks_exact(self.at_once(electrodes));
+        let parts = all.chunks_exact(self.numbers_at(electrodes));
         let mut parts = parts.map(|all| &all[which * count..(which + 1) * count]);
         let [value, x, y] = core::array::from_fn(|_| parts.next().unwrap_or(&[]));
         for (to, from) in [&mut at.value].into_iter().chain(&mut at.slope).zip([value, x, y]) {
