@@ -74,14 +74,13 @@ impl Cloud {
     }
 }
 
-/// Strips of a usual width that contacts may stand for: two of them for a line, one for a ring, more for both.
+/// Strips of a usual width that contacts may stand for: one of them for a ring, more for a line too. Two contacts whose widths readings do not
+/// tell are no ring.
 pub(super) fn starts(contacts: &[FoundContact], usual_width_m: f64) -> Vec<Strip> {
     let Some(cloud) = Cloud::of(contacts, 0.5 * usual_width_m) else { return Vec::new() };
-    let mut courses = match contacts.len() {
-        1 => vec![cloud.ring()],
-        2 => vec![cloud.line()],
-        _ => vec![cloud.line(), cloud.ring()],
-    };
+    let may_be_ring = contacts.len() != 2 || contacts.iter().any(|contact| contact.radius_m.is_some());
+    let line = (contacts.len() > 1).then(|| cloud.line());
+    let mut courses: Vec<_> = line.into_iter().chain(may_be_ring.then(|| cloud.ring())).collect();
     if contacts.len() > 2
         && let Some(circle) = cloud.circle()
         && are_apart(&cloud.ring(), &circle)
