@@ -11,12 +11,12 @@ export function headlineOf(update) {
   const { choice, contacts, image, shape, floor } = update;
   const what = choice?.what ?? "";
   if (isSearched(update)) return "Something touches";
-  const counted = (word) => (contacts.length === 1 ? `1 ${word}` : `${contacts.length} ${word}s`);
-  if (shape) return nameOf(shape);
+  const counted = (word, count = contacts.length) => (count === 1 ? `1 ${word}` : `${count} ${word}s`);
+  const other = update.otherContacts;
+  if (shape) return other === null ? nameOf(shape) : `${nameOf(shape)} or ${counted("contact", other)}`;
   // Of a solver that chooses, contacts beside an image are what `contacts` would find; of others, they are its peaks.
   if (image.length && what !== "nothing") return contacts.length ? `Image, ${counted(what === "image" ? "contact" : "peak")}` : "Image";
   if (!contacts.length) return floor?.isPressed ? "Something touches" : "Nothing touches";
-  const other = update.otherContacts;
   if (other === null || other === contacts.length) return counted("contact");
   return `${Math.min(other, contacts.length)} or ${Math.max(other, contacts.length)} contacts`;
 }
@@ -34,10 +34,10 @@ export function sureOf(update) {
   if (flags.includes("misfit")) return "not sure: the readings do not fit this";
   if (flags.includes("unfinished") && !image.length) return "looking for a better answer";
   if (floor && !contacts.length && !shape && !image.length) return belowFloor(floor);
-  if (shape || image.length || !contacts.length || certainty === null) return "";
+  if (certainty === null || (!shape && (image.length || !contacts.length))) return "";
   const word = SURE.find(([from]) => certainty >= from)[1];
   // Nobody is surer than that.
-  return `${word} of the number (${certainty >= 0.995 ? "> 99" : fixed(100 * certainty, 0)} %)`;
+  return `${word} of the ${shape ? "shape" : "number"} (${certainty >= 0.995 ? "> 99" : fixed(100 * certainty, 0)} %)`;
 }
 
 /** What stands in place of contacts where there are none. */

@@ -27,6 +27,11 @@ impl Evidence {
         self.cost + self.price
     }
 
+    /// Probability of this explanation against another one.
+    pub fn share_against(&self, other: &Self) -> f64 {
+        1.0 / (1.0 + (0.5 * (self.score() - other.score())).exp())
+    }
+
     /// Whether more is left of so many readings than noise and the model's error make.
     pub fn is_misfit(&self, readings: usize) -> bool {
         self.exceeds(1.0, policy::misfit_deviations(), readings)
@@ -93,6 +98,10 @@ mod tests {
     fn a_parameter_has_to_be_worth_its_price() {
         assert!(evidence(240.0, 6).score() < evidence(230.0, 9).score());
         assert!(evidence(240.0, 6).score() > evidence(210.0, 9).score());
+        // Two nats are odds of 7.4.
+        let shares =
+            [[240.0, 236.0], [236.0, 240.0]].map(|[one, other]| evidence(one, 6).share_against(&evidence(other, 6)));
+        assert!((shares[1] / shares[0] - 2.0_f64.exp()).abs() < 1e-9 && (shares[0] + shares[1] - 1.0).abs() < 1e-12);
     }
 
     #[test]

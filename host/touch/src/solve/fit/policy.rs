@@ -161,7 +161,7 @@ thresholds! {
     /// A line or a ring is less likely than contacts by so many nats before anything is read, which is 1 in 400: fingers are more common. Two alike ones, 10 mm
     /// apart on `square-60`, and a line of 18 mm explain readings alike: with 5 nats half of such pairs are lines, with 8 a tenth. Of lines and
     /// rings on a detector as built, 95 and 90 % are found with 5, 84 and 83 % with 8.
-    shape_nats: f64 = 6.0;
+    shape_nats: f64 = 7.0;
     /// A shape of so many times the rival's score on the coarse mesh is given up.
     shape_rivals: f64 = 4.0;
     /// Shortest line, in mean distances of electrodes.

@@ -43,8 +43,25 @@ struct FrameHypothesis {
     contacts: Option<Box<ContactHypothesis>>,
     /// What explains the frame better than they do, and why it is believed.
     whole: Option<(Whole, String)>,
+    /// The shape that explains the frame nearly as well, where contacts are the answer.
+    rival: Option<Rival>,
     /// The mean of the frames up to it as far as they stood still.
     mean: Option<Mean>,
+}
+
+/// A shape that may be there in place of the contacts that are believed.
+#[derive(Clone, Copy, Debug)]
+struct Rival {
+    name: &'static str,
+    /// Its probability.
+    share: f64,
+}
+
+impl Rival {
+    fn of(shape: &StripFit, contacts: Evidence) -> Self {
+        let name = if shape.strip().is_line() { "line" } else { "ring" };
+        Self { name, share: shape.evidence().share_against(&contacts) }
+    }
 }
 
 /// What touches as one, rather than as contacts.

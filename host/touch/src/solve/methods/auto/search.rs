@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::words::instead_of;
 use super::{
-    ContactFinder, ContactHypothesis, ContactSearch, Evidence, FrameHypothesis, Nonlinear, ShapeFinder, Solution,
-    SolveError, Target, Whole, image_evidence,
+    ContactFinder, ContactHypothesis, ContactSearch, Evidence, FrameHypothesis, Nonlinear, Rival, ShapeFinder,
+    Solution, SolveError, Target, Whole, image_evidence,
 };
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::fit::approximation::ApproximationError;
@@ -31,13 +31,12 @@ impl AutoSearch {
         self.image.go_on_from(None);
     }
 
-    /// The line or ring that explains a frame better than contacts, if there may be one.
+    /// The line or ring that explains a frame best, if there may be one.
     fn shape(&self, contacts: (&Solution, Evidence), from: Option<&StripFit>, target: &Target) -> Option<StripFit> {
         let (solution, evidence) = contacts;
         let shapes = self.shapes.as_ref()?;
         let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
-        let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
-        (shape.evidence().score() < evidence.score()).then_some(shape)
+        may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))?
     }
 
     /// The line or ring that explains a frame of a detector that is not known exactly, where the contacts so far do not: each more
@@ -70,8 +69,10 @@ impl AutoSearch {
         let finder = self.finder.as_ref()?;
         let target = finder.target_of(mean, contacts.error()).ok()?;
         let solution = search.solution(contacts, mean).ok().filter(|_| !is_partial(&target))?;
-        let shape = self.shape((&solution, finder.evidence_of_found(contacts)), from, &target)?;
-        (!shape.evidence().may_be_better(1.0, target.count())).then_some(shape)
+        let evidence = finder.evidence_of_found(contacts);
+        let shape = self.shape((&solution, evidence), from, &target)?;
+        let is_better = shape.evidence().score() < evidence.score();
+        (is_better && !shape.evidence().may_be_better(1.0, target.count())).then_some(shape)
     }
 
     /// The line or ring that was followed, if it still explains a frame with what readings may be off by together where it is now; and contacts
@@ -109,18 +110,22 @@ impl AutoSearch {
         Ok(FrameHypothesis { whole, ..FrameHypothesis::default() })
     }
 
-    /// What explains the frame as a whole better than contacts do, if anything.
+    /// What explains the frame as a whole better than contacts do, if anything; else a shape that nearly does.
     pub(super) fn whole(
         &mut self,
         (contacts, solution): (Evidence, &Solution),
         from: Option<(Whole, String)>,
         target: &Target,
         readings: &Readings,
-    ) -> Result<Option<Whole>, SolveError> {
+    ) -> Result<(Option<Whole>, Option<Rival>), SolveError> {
         if self.image.is_rest(readings) || is_partial(target) {
-            return Ok(None);
+            return Ok((None, None));
         }
         let shape = self.shape((solution, contacts), shape_of(from.as_ref()), target);
+        let (shape, rival) = match shape {
+            Some(shape) if shape.evidence().score() < contacts.score() => (Some(shape), None),
+            other => (None, other.map(|shape| Rival::of(&shape, contacts))),
+        };
         let best = shape.as_ref().map_or(contacts, StripFit::evidence);
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
         // Of a provisional target nothing is claimed that another model could do better than.
@@ -130,15 +135,15 @@ impl AutoSearch {
         // As many as are looked for stand for more.
         let is_full = self.finder.as_ref().is_some_and(|finder| count >= finder.most());
         if !(is_doubtful || is_full || best.is_misfit(target.count())) {
-            return Ok(shape);
+            return Ok((shape, rival));
         }
         let image = self.image(from, readings)?;
         let evidence = image_evidence(&self.image, readings, target)?;
         let Some(by_image) = evidence.map(|evidence| evidence.score()).filter(|score| *score < best.score()) else {
-            return Ok(shape);
+            return Ok((shape, rival));
         };
         let shape = self.shape_of_image(readings, target, by_image)?;
-        Ok(shape.map(|fit| Whole::Shape(Box::new(fit))).or(image))
+        Ok((shape.map(|fit| Whole::Shape(Box::new(fit))).or(image), None))
     }
 
     /// The line or ring that an image stands for, if it explains the frame better: contacts that explain nothing do not lead to it.
@@ -175,13 +180,13 @@ impl Search for AutoSearch {
         let mean = from.mean.take().unwrap_or_else(|| Mean::of_frame(readings));
         let readings = &mean.readings;
         let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings).map(Hypothesis::of) };
-        let FrameHypothesis { contacts, whole: from, .. } = from;
+        let FrameHypothesis { contacts, whole: from, rival: before, .. } = from;
         let search = ContactSearch::new(Arc::clone(&finder));
         if let Some((Whole::Shape(fit), why)) = &from {
             let error = contacts.as_ref().and_then(|contacts| contacts.error());
             if let Some((contacts, shape)) = self.renewed(&search, fit, error, &mean) {
                 let (contacts, whole) = (Some(Box::new(contacts)), Some((Whole::Shape(Box::new(shape)), why.clone())));
-                return Ok(Hypothesis::of(FrameHypothesis { contacts, whole, mean: Some(mean) }));
+                return Ok(Hypothesis::of(FrameHypothesis { contacts, whole, rival: None, mean: Some(mean) }));
             }
         }
         let contacts = contacts.filter(|_| from.is_none());
@@ -195,7 +200,7 @@ impl Search for AutoSearch {
             // A picture does not change to contacts that may not explain it.
             if from.is_none() {
                 let contacts = Some(Box::new(better));
-                let lead = FrameHypothesis { contacts, whole: None, mean: Some(mean.clone()) };
+                let lead = FrameHypothesis { contacts, mean: Some(mean.clone()), ..FrameHypothesis::default() };
                 is_past = found(Hypothesis::of(lead)).is_break();
             }
             if is_past { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -205,13 +210,13 @@ impl Search for AutoSearch {
             return Ok(Hypothesis::of(FrameHypothesis { mean: Some(mean), ..FrameHypothesis::default() }));
         };
         let target = finder.target_of(&mean, contacts.error())?;
-        let whole = match early {
-            Some(shape) => Some(Whole::Shape(Box::new(shape))),
+        let (whole, rival) = match early {
+            Some(shape) => (Some(Whole::Shape(Box::new(shape))), None),
             // Whether they are contacts at all is not asked by every look at more frames of them, nor of a frame that is past.
-            None if is_of_key_frames || is_past => None,
+            None if is_of_key_frames || is_past => (None, before),
             None => self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?,
         };
         let whole = whole.map(|whole| (whole, instead_of(&solution)));
-        Ok(Hypothesis::of(FrameHypothesis { contacts: Some(Box::new(contacts)), whole, mean: Some(mean) }))
+        Ok(Hypothesis::of(FrameHypothesis { contacts: Some(Box::new(contacts)), whole, rival, mean: Some(mean) }))
     }
 }

@@ -3,10 +3,10 @@
 use super::first_look::FirstLook;
 use super::words::{as_contacts, as_whole, nothing};
 use super::{
-    ContactHypothesis, ContactTracker, Evidence, FrameHypothesis, Nonlinear, ShapeTracker, Solution, SolveError,
+    ContactHypothesis, ContactTracker, Evidence, FrameHypothesis, Nonlinear, Rival, ShapeTracker, Solution, SolveError,
     Target, Whole, image_evidence,
 };
-use crate::solve::answer::{FoundContact, check};
+use crate::solve::answer::{Alternative, FoundContact, check};
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::fit::policy;
 use crate::solve::methods::image::Descent;
@@ -25,6 +25,8 @@ pub(super) struct AutoTracker {
     image: Nonlinear,
     first_look: FirstLook,
     answer: Answer,
+    /// What else the contacts that were searched may be.
+    rival: Option<Rival>,
     /// Frames for which nothing is searched while an image is the answer, and how many it will be next time.
     skip: u32,
     patience: u32,
@@ -65,6 +67,7 @@ impl AutoTracker {
             image,
             first_look,
             answer: Answer::Contacts,
+            rival: None,
             skip: 0,
             patience: policy::image_patience()[0],
         }
@@ -98,31 +101,45 @@ impl AutoTracker {
         let search = contacts.follow(target);
         // That more frames of the same are looked at casts no doubt on what is shown.
         let is_doubted = search && !contacts.has_news();
-        Followed { solution: as_contacts(contacts.solution(target), is_doubted), search }
+        Followed { solution: as_contacts(contacts.solution(target), self.rival, is_doubted), search }
     }
 
-    fn follow_shape(&mut self, target: &Target, why: &str) -> Option<Followed> {
+    fn follow_shape(&mut self, target: &Target) -> Option<Followed> {
         let shapes = self.shapes.as_mut()?;
         let search = shapes.follow(target);
-        let solution = shapes.solution(target)?;
-        Some(Followed { solution: as_whole(solution, why), search })
+        Some(Followed { solution: shapes.solution(target)?, search })
     }
 
-    fn follow_image(&mut self, readings: &Readings, why: &str) -> Result<Followed, SolveError> {
+    fn follow_image(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         let (solution, is_lost) = self.image.follow(readings)?;
         let search = is_lost || self.skip == 0;
         self.skip = self.skip.saturating_sub(1);
-        Ok(Followed { solution: as_whole(solution, why), search })
+        Ok(Followed { solution, search })
     }
 
     /// A shape or an image with the contacts beside it.
-    fn beside(&mut self, mut followed: Followed, target: Option<&Target>) -> Followed {
+    fn beside(&mut self, Followed { solution, mut search }: Followed, target: Option<&Target>, why: &str) -> Followed {
         if let (Some(contacts), Some(target)) = (&mut self.contacts, target) {
             contacts.follow(target);
-            followed.search |= contacts.finder().is_outdated(target);
-            followed.solution.contacts = contacts.solution(target).contacts;
+            search |= contacts.finder().is_outdated(target);
         }
-        followed
+        Followed { solution: self.with_contacts(solution, target, why), search }
+    }
+
+    /// A shape or an image that was brought to a frame with the contacts that were too, and how sure a shape is against these.
+    fn with_contacts(&mut self, mut solution: Solution, target: Option<&Target>, why: &str) -> Solution {
+        if let (Some(contacts), Some(target)) = (&mut self.contacts, target) {
+            solution.contacts = contacts.solution(target).contacts;
+            let by_shape = self.shapes.as_ref().and_then(ShapeTracker::evidence).filter(|_| solution.shape.is_some());
+            if let (Some(by_shape), false) = (by_shape, solution.flags.is_doubtful()) {
+                let untried = if target.error().is_some() { policy::untried_share() } else { 0.0 };
+                let share = by_shape.share_against(&contacts.evidence(target));
+                let other = Alternative { contacts: solution.contacts.len(), certainty: 1.0 - share };
+                solution.certainty = Some(share.min(1.0 - untried));
+                solution.alternative = Some(other).filter(|other| other.certainty >= policy::named_share());
+            }
+        }
+        as_whole(solution, why)
     }
 
     /// Goes on from a shape that was found, if it explains the frame better than the one that is followed; what that leaves.
@@ -177,18 +194,18 @@ impl AutoTracker {
 
     /// The answer to a frame that it was brought to, with the contacts beside it; `search` is whether contacts have to be searched again.
     fn answered(&mut self, readings: &Readings, target: &Target, search: bool) -> Result<Followed, SolveError> {
-        let contacts = self.contacts.as_mut().map(|contacts| contacts.solution(target)).unwrap_or_default();
         let (whole, search) = match (&self.answer, &self.shapes) {
             (Answer::Shape(why), Some(shapes)) => {
-                (shapes.solution(target).map(|shape| as_whole(shape, why)), shapes.has_lost(target))
+                (shapes.solution(target).map(|shape| (shape, why.clone())), shapes.has_lost(target))
             }
-            (Answer::Image(why), _) => (Some(as_whole(self.image.solution(readings)?, why)), self.skip == 0),
+            (Answer::Image(why), _) => (Some((self.image.solution(readings)?, why.clone())), self.skip == 0),
             _ => (None, search),
         };
         let search = search || self.contacts.as_ref().is_some_and(|contacts| contacts.finder().is_outdated(target));
-        let solution = match whole {
-            Some(whole) => Solution { contacts: contacts.contacts, ..whole },
-            None => as_contacts(contacts, search),
+        let solution = match (whole, &mut self.contacts) {
+            (Some((whole, why)), _) => self.with_contacts(whole, Some(target), &why),
+            (None, Some(contacts)) => as_contacts(contacts.solution(target), self.rival, search),
+            (None, None) => nothing(Solution::default(), search),
         };
         self.first_look.of(Followed { solution, search }, readings)
     }
@@ -211,12 +228,12 @@ impl AutoTracker {
             self.take(Answer::Contacts);
         }
         let whole = match (self.answer.clone(), &target) {
-            (Answer::Shape(why), Some(target)) => self.follow_shape(target, &why),
-            (Answer::Image(why), _) => Some(self.follow_image(readings, &why)?),
+            (Answer::Shape(why), Some(target)) => self.follow_shape(target).zip(Some(why)),
+            (Answer::Image(why), _) => Some((self.follow_image(readings)?, why)),
             _ => None,
         };
         match whole {
-            Some(followed) => Ok(self.beside(followed, target.as_ref())),
+            Some((followed, why)) => Ok(self.beside(followed, target.as_ref(), &why)),
             None => {
                 let is_gone = !matches!(self.answer, Answer::Contacts);
                 self.take(Answer::Contacts);
@@ -244,7 +261,7 @@ impl Tracker for AutoTracker {
             (Answer::Contacts, Some(contacts)) => {
                 self.average.reset();
                 let Followed { solution, search } = contacts.follow_rows(rows, elapsed_s)?;
-                self.first_look.of(Followed { solution: as_contacts(solution, search), search }, latest)
+                self.first_look.of(Followed { solution: as_contacts(solution, self.rival, search), search }, latest)
             }
             _ => self.follow(latest),
         }
@@ -265,7 +282,8 @@ impl Tracker for AutoTracker {
         };
         // What is followed and what was found some frames ago are all brought to this frame: the lowest score is believed. Where no
         // reading stands out there may be a very light contact still.
-        let FrameHypothesis { contacts: found, whole, mean: searched } = hypothesis;
+        let FrameHypothesis { contacts: found, whole, rival, mean: searched } = hypothesis;
+        self.rival = rival;
         let frames = searched.map_or(1, |mean| mean.frames);
         let whole = whole.filter(|_| !self.image.is_rest(readings));
         let search =
@@ -309,7 +327,12 @@ impl Tracker for AutoTracker {
             }
         };
         let contacts = self.contacts.as_ref().and_then(ContactTracker::found).map(Box::new);
-        Hypothesis::of(FrameHypothesis { contacts, whole, mean: self.latest().or_else(|| self.average.mean()) })
+        Hypothesis::of(FrameHypothesis {
+            contacts,
+            whole,
+            rival: self.rival,
+            mean: self.latest().or_else(|| self.average.mean()),
+        })
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {
@@ -323,6 +346,7 @@ impl Tracker for AutoTracker {
             contacts.reset();
         }
         self.average.reset();
+        self.rival = None;
         self.take(Answer::Contacts);
     }
 }

@@ -1,14 +1,27 @@
 //! What was chosen, in words.
 
+use super::Rival;
 use crate::solve::answer::{Alternative, Calibrated, Choice, FoundShape, Solution};
+use crate::solve::fit::policy;
 
-/// The solution of contacts, and what it is.
-pub(super) fn as_contacts(solution: Solution, search: bool) -> Solution {
+/// The solution of contacts, and what it is; there may be a shape in place of them.
+pub(super) fn as_contacts(mut solution: Solution, rival: Option<Rival>, search: bool) -> Solution {
     if solution.contacts.is_empty() {
         return nothing(solution, search);
     }
-    let what = either(solution.contacts.len(), solution.alternative);
-    let sure = solution.certainty.map(|certainty| sure(solution.contacts.len(), certainty, solution.alternative));
+    let rival = rival.filter(|rival| solution.certainty.is_some() && rival.share >= policy::named_share());
+    let share = 1.0 - rival.map_or(0.0, |rival| rival.share);
+    solution.certainty = solution.certainty.map(|certainty| share * certainty);
+    let of_less = |other: Alternative| Alternative { certainty: share * other.certainty, ..other };
+    solution.alternative = solution.alternative.map(of_less).filter(|other| other.certainty >= policy::named_share());
+    let found = solution.contacts.len();
+    let what =
+        either(found, solution.alternative) + &rival.map(|rival| format!(" or a {}", rival.name)).unwrap_or_default();
+    let others = [
+        solution.alternative.map(|other| (other.contacts.to_string(), other.certainty)),
+        rival.map(|rival| (format!("a {}", rival.name), rival.share)),
+    ];
+    let sure = solution.certainty.map(|certainty| sure(&found.to_string(), certainty, others));
     let left = left(&solution) + &sure.unwrap_or_default() + &calibrate(&solution);
     let why = if search { format!("{left}; searching for a better answer") } else { left };
     chosen(solution, what, why)
@@ -26,10 +39,16 @@ pub(super) fn nothing(mut solution: Solution, search: bool) -> Solution {
 
 /// The solution of a shape or an image, and why it is one.
 pub(super) fn as_whole(solution: Solution, why: &str) -> Solution {
-    let what = solution.shape.as_ref().map_or("image", FoundShape::name);
+    let name = solution.shape.as_ref().map_or("image", FoundShape::name);
+    let what = match solution.alternative {
+        Some(Alternative { contacts, .. }) => format!("{name} or {}", counted(contacts)),
+        None => name.to_owned(),
+    };
+    let other = solution.alternative.map(|other| (counted(other.contacts), other.certainty));
+    let sure = solution.certainty.map(|certainty| sure(&format!("a {name}"), certainty, [other, None]));
     let figures = solution.shape.as_ref().map(|shape| format!("{}; ", figures(shape))).unwrap_or_default();
-    let why = format!("{}; {figures}{why}", left(&solution));
-    chosen(solution, what.to_owned(), why)
+    let why = format!("{}; {figures}{why}{}", left(&solution), sure.unwrap_or_default());
+    chosen(solution, what, why)
 }
 
 /// Why contacts are not the answer.
@@ -69,15 +88,13 @@ fn either(found: usize, alternative: Option<Alternative>) -> String {
     format!("{} or {}", found.min(other), counted(found.max(other)))
 }
 
-/// How sure their number is.
-fn sure(found: usize, certainty: f64, alternative: Option<Alternative>) -> String {
-    let percent = 100.0 * certainty;
-    match alternative {
-        Some(Alternative { contacts, certainty }) => {
-            format!("; {percent:.0} % sure of {found}, {:.0} % of {contacts}", 100.0 * certainty)
-        }
-        None => format!("; count {percent:.0} % sure"),
-    }
+/// How sure what was found is, and what else it may be.
+fn sure(found: &str, certainty: f64, others: [Option<(String, f64)>; 2]) -> String {
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let others = others.into_iter().flatten();
+    let others: String = others.map(|(other, share)| format!(", {} of {other}", percent(share))).collect();
+    let of_found = if others.is_empty() { String::new() } else { format!(" of {found}") };
+    format!("; {} sure{of_found}{others}", percent(certainty))
 }
 
 fn counted(contacts: usize) -> String {
