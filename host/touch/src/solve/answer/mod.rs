@@ -38,10 +38,10 @@ pub struct Solution {
     pub flags: Flags,
     /// What a calibration would bring, where [`Flags::calibrate`] asks for one.
     pub calibrated: Option<Calibrated>,
-    /// Probability that as many contacts touch as were found, against other numbers of contacts; of a method that weighs them. `None` where the
-    /// answer [is doubtful](Flags::is_doubtful).
+    /// Probability that as many contacts touch as were found, against other numbers of contacts and a shape, or that of a shape against contacts; of a
+    /// method that weighs them. `None` where the answer [is doubtful](Flags::is_doubtful).
     pub certainty: Option<f64>,
-    /// The likeliest other number of contacts, where that has 5 % at least.
+    /// The likeliest other number of contacts, or the number in place of a shape, where that has 5 % at least.
     pub alternative: Option<Alternative>,
     /// What was chosen and why, by a solver that chooses.
     pub choice: Option<Choice>,
