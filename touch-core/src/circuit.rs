@@ -39,12 +39,15 @@ pub(crate) struct Circuit<T, const K: usize> {
     /// Slopes (ohm/m) and bends (ohm/m2) of the field at a contact from another one, by the place of the first.
     pub slopes_ohm_per_m: [[[T; 2]; K]; K],
     bends_ohm_per_m2: [[[T; 2]; K]; K],
+    /// Whether it is solved for the contacts that it has, and whether all that only derivatives need is found too.
+    pub is_solved: bool,
     is_derived: bool,
 }
 
 impl<T: Real, const K: usize> Circuit<T, K> {
     pub const EMPTY: Self = Self {
         count: 0,
+        is_solved: false,
         is_derived: false,
         loaded: [Loaded::NONE; K],
         constant_ohm: [T::ZERO; MAX_ELECTRODES],
@@ -56,10 +59,17 @@ impl<T: Real, const K: usize> Circuit<T, K> {
 
     /// Solves for some contacts, `K` at most; `false` if their fields cannot be those of contacts, as when two are at one place.
     pub fn solve(&mut self, detector: &Detector<'_, T>, spots: &[Spot<T>]) -> bool {
-        at_once(
+        self.is_solved = at_once(
             #[inline(always)]
             || self.solve_all(detector, spots),
-        )
+        );
+        self.is_solved
+    }
+
+    /// Whether it is solved for these contacts, on some detector.
+    pub fn is_solved_for(&self, spots: &[Spot<T>]) -> bool {
+        let there = self.loaded.iter().take(self.count).map(|one| &one.spot);
+        self.is_solved && there.eq(spots)
     }
 
     #[inline(always)]

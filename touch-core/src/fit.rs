@@ -59,7 +59,8 @@ impl<T: Real, const K: usize, const D: usize> Scene<T, K, D> {
 
     /// A scene so far on the way to another one of as many contacts.
     pub fn towards(mut self, to: &Self, share: T) -> Self {
-        let between = |from: &mut T, to: T| *from += share * (to - *from);
+        // All of the way is that scene, digit by digit.
+        let between = |from: &mut T, to: T| *from = share * to + (T::ONE - share) * *from;
         for (spot, to) in self.spots.iter_mut().zip(&to.spots).take(self.count) {
             spot.at_m.iter_mut().zip(to.at_m).for_each(|(from, to)| between(from, to));
             between(&mut spot.ln_ohm, to.ln_ohm);
@@ -237,9 +238,9 @@ pub(crate) struct Fitting<T, const K: usize, const D: usize> {
     pub(crate) steps: u8,
     tries: u8,
     pub(crate) has_looked: bool,
-    /// Where the detector is not known: whether the circuit is solved and read where the scene is, and whether derivatives are those there.
-    pub(crate) is_solved: bool,
+    /// Where the detector is not known: whether derivatives are those where the scene is, and the standard deviation of the logarithms of radii that is in them.
     pub(crate) is_derived: bool,
+    pub(crate) weighed: T,
     /// What another round has to gain (squared deviations).
     pub(crate) worth: T,
     /// What is not known of a detector, and the scene whose patterns are held.
@@ -262,8 +263,8 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         steps: 0,
         tries: 0,
         has_looked: false,
-        is_solved: false,
         is_derived: false,
+        weighed: T::ONE,
         worth: T::ZERO,
         on: OnUnknown::NONE,
         held_at: Scene::EMPTY,
@@ -275,6 +276,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
     /// Begins to step from a scene to where it fits best, so many steps at most.
     pub fn begin(&mut self, scene: Scene<T, K, D>, radius_deviation: T, steps: u8) {
         self.goes_on = false;
+        self.is_derived &= scene == self.scene;
         self.on.damping = T::ONE;
         self.worth = T::of(if steps <= TRYING { ROUGHLY } else { EXACTLY });
         (self.scene, self.trial, self.radius_deviation) = (scene, scene, radius_deviation);

@@ -140,6 +140,11 @@ impl Layout {
         self.as_moved(numbers, shares)
     }
 
+    /// Whether what was worked out last is of these steps.
+    pub fn is_moved_by<T: Real>(&self, steps: &[T], numbers: &[T]) -> bool {
+        numbers[..self.directions] == steps[..self.directions]
+    }
+
     /// What was worked out last.
     pub fn as_moved<'m, T: Real>(&self, numbers: &'m mut [T], shares: &'m [f32]) -> Moved<'m, T> {
         let [steps, pads_ohm, distances_ohm, walls, crowding, gains, offsets_v, bows_v, lows_v, per_v, last] =

@@ -212,7 +212,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// Takes the places where one more contact would explain most of what those of the last fit leave among the best.
     pub(crate) fn births(
-        &self,
+        &mut self,
         task: Task<'_, T>,
         unknown: &Unknown<'_>,
         circuit: &mut Circuit<T, K>,
@@ -224,6 +224,8 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         let mut on = On { task, unknown, circuit, parts, is_moved: false };
         let (detector, circuit, held) = on.there();
         circuit.derive(task.table);
+        // What is left is whitened in place.
+        self.is_derived = false;
         let (tau, normal) = (self.on.tau, &self.normal);
         let noise_v = tau * task.errors.variance_v2.sqrt();
         Births { task, detector: &detector, circuit, normal, held, noise_v, tau }.look(best, work);
@@ -235,10 +237,15 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
             return true;
         }
         let Some(left) = on.left(&self.scene) else { return false };
-        (self.is_solved, self.is_derived) = (true, false);
         let rms = (left / on.task.readings()).sqrt();
         self.on.tau = if rms > T::of(NOISE) { rms } else { T::ONE };
         (self.on.left, self.on.prior) = (left, prior(&self.scene, self.radius_deviation_in(self.on.tau)));
+        // Where it begins where the last one ended, derivatives are there.
+        self.is_derived &= self.on.tau == T::ONE;
+        if self.is_derived {
+            self.normal.weigh_radii(on.circuit, [self.weighed, self.radius_deviation]);
+            self.weighed = self.radius_deviation;
+        }
         true
     }
 
@@ -247,7 +254,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         if self.is_derived {
             return Some(());
         }
-        if !core::mem::replace(&mut self.is_solved, true) && !on.read(&self.scene) {
+        if !on.read(&self.scene) {
             return None;
         }
         let task = on.task;
@@ -264,7 +271,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         }
         held.set_state(&self.scene.steps);
         self.sum_up(on, work);
-        self.is_derived = true;
+        (self.is_derived, self.weighed) = (true, self.radius_deviation_in(self.on.tau));
         self.normal.objective().is_finite().then_some(())
     }
 
@@ -313,7 +320,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
 
     /// What contacts leave at least on any detector, in the linear theory of the patterns that are held.
     fn left_by(&mut self, scene: &Scene<T, K, D>, on: &mut On<'_, '_, T, K, D>) -> Option<T> {
-        (self.is_solved, self.is_derived, on.is_moved) = (false, false, true);
+        (self.is_derived, on.is_moved) = (false, true);
         let makes_sense = on.read(scene);
         on.is_moved = false;
         if !makes_sense {
@@ -345,12 +352,11 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
                 let prior = prior(&there, self.radius_deviation_in(self.on.tau));
                 let new = OnUnknown { left, prior, ..self.on };
                 if new.objective() < self.on.objective() {
-                    (self.scene, self.on, self.is_solved) = (there, new, true);
+                    (self.scene, self.on) = (there, new);
                     return share;
                 }
             }
         }
-        self.is_solved = false;
         T::ZERO
     }
 
@@ -379,7 +385,7 @@ impl<T: Real, const K: usize, const D: usize> Fitting<T, K, D> {
         self.is_derived &= self.on.damping == T::ONE;
         self.on.damping = T::ONE;
         self.derive(on, work)?;
-        if !core::mem::replace(&mut self.is_solved, true) && !on.read(&self.scene) {
+        if !on.read(&self.scene) {
             return None;
         }
         let (_, circuit, held) = on.there();

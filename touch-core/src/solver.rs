@@ -283,6 +283,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
         }
         if self.stage == Stage::Idle {
             self.fitting.on.begin_frame(&mut errors, frame.volts.len());
+            (self.circuit.is_solved, self.fitting.is_derived) = (false, false);
         }
         errors
     }
@@ -311,7 +312,7 @@ impl<T: Real, const K: usize, const D: usize> Solver<T, K, D> {
                 _ => Some(self.search.placed(readings)),
             },
             Piece::Beside(from) => {
-                let (fitting, starts) = (&self.fitting, &mut self.search.starts);
+                let (fitting, starts) = (&mut self.fitting, &mut self.search.starts);
                 if D > 0
                     && let (Some(unknown), Some(room)) = (task.unknown, &mut bench.room)
                 {

@@ -29,12 +29,17 @@ impl<'a, T: Real, const K: usize, const D: usize> On<'a, '_, T, K, D> {
         (Detector { table, moved: Some((self.unknown, moved)) }, &mut *self.circuit, held)
     }
 
-    /// Solves a scene on its detector and notes what is there to be read, and what channels make of it; `false` if it makes no sense.
+    /// Solves a scene on its detector and notes what is there to be read, and what channels make of it, unless that was done last; `false` if it makes no sense.
     pub fn read(&mut self, scene: &Scene<T, K, D>) -> bool {
         let table = self.task.table;
-        if !self.is_moved {
-            let Parts { moved, shares, .. } = &mut self.parts;
-            Layout::of(table, self.unknown).moved(table, self.unknown, &scene.steps, moved, shares);
+        let Parts { moved, shares, .. } = &mut self.parts;
+        let layout = Layout::of(table, self.unknown);
+        let is_there = self.is_moved || self.circuit.is_solved && layout.is_moved_by(&scene.steps, moved);
+        if !is_there {
+            layout.moved(table, self.unknown, &scene.steps, moved, shares);
+        }
+        if is_there && self.circuit.is_solved_for(scene.spots()) {
+            return true;
         }
         let (detector, circuit, held) = self.there();
         if !circuit.solve(&detector, scene.spots()) {
