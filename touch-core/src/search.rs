@@ -300,8 +300,8 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
         Wants::Fit(at.scene, T::of(ANY_RADIUS), SEARCHING)
     }
 
-    /// Whether what was grown last is less likely than what explains the readings with fewer contacts. Of 1000 random scenes on a detector that is known, 400 on detectors as built, 400
-    /// hands, 200 near pairs as many are right where more are looked for beside that, in a third more time.
+    /// Whether what was grown last is less likely than what explains the readings with fewer contacts: more beside it would be sought in vain. Of 1800 random scenes on a detector that is
+    /// known 89.7 % are right, of 800 on detectors as built 61 %; 89.0 and 60.5 where they are, in a third more time on the former.
     fn is_enough(&self, readings: T) -> bool {
         self.best.is_some_and(|best| best.scene.count < self.at.scene.count && !is_misfit(&best, readings))
     }
