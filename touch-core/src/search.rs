@@ -301,7 +301,7 @@ impl<T: Real, const K: usize, const D: usize> Search<T, K, D> {
     }
 
     /// Whether what was grown last is less likely than what explains the readings with fewer contacts: more beside it would be sought in vain. Of 1800 random scenes on a detector that is
-    /// known 89.7 % are right, of 800 on detectors as built 61 %; 89.0 and 60.5 where they are, in a third more time on the former.
+    /// known 89.7 % are right, and of 800 on detectors as built 61.0; 89.0 and 60.5 where the search goes on, in a third more time on the former.
     fn is_enough(&self, readings: T) -> bool {
         self.best.is_some_and(|best| best.scene.count < self.at.scene.count && !is_misfit(&best, readings))
     }
