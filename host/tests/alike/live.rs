@@ -14,10 +14,8 @@ use tactomo::simulate::Simulation;
 use tactomo::solve::{Method, Problem, Solution};
 use tokio::sync::watch;
 
-/// Time of the scene from which on answers count (s).
-const SETTLED_S: f64 = 0.2;
 /// A cold search of five discs that do not explain a ring, beside the simulated board on two cores: 0.2 to 0.9 s were measured.
-const SEARCH_S: f64 = 1.0;
+pub const SEARCH_S: f64 = 1.0;
 /// Seed of scene, noise and faults.
 const SEED: u64 = 1;
 
@@ -36,6 +34,8 @@ pub struct Live {
     pub summary: Summary,
     pub recording: PathBuf,
     scene: Scene,
+    /// Time of the scene from which on answers count, and when it ends (s).
+    counted_s: [f64; 2],
 }
 
 struct Keeper(Arc<Mutex<Vec<(u64, u64, Solution)>>>);
@@ -47,8 +47,8 @@ impl Listener for Keeper {
 }
 
 impl Live {
-    /// Runs a solver on a scene for so long.
-    pub fn run(problem: &Problem, method: Method, name: SceneName, seconds: f64) -> Self {
+    /// Runs a solver on a scene; answers count from the first of two times on, and it ends at the second (s).
+    pub fn run(problem: &Problem, method: Method, name: SceneName, counted_s: [f64; 2]) -> Self {
         let detector = problem.detector().clone();
         let scene = Scene::new(name, &detector, Hand::relative(&detector), SEED);
         let simulation = Simulation::new(&detector, scene.clone(), &[], SEED).unwrap();
@@ -61,7 +61,7 @@ impl Live {
             solving: Some(Solving::new(method, problem.clone())),
             recorder: Some(Recorder::create(&recording, &header).unwrap()),
             listeners: vec![Box::new(Keeper(Arc::clone(&kept)))],
-            seconds: Some(Duration::from_secs_f64(seconds)),
+            seconds: Some(Duration::from_secs_f64(counted_s[1])),
             ..RunOptions::new(detector)
         };
         let (snapshots, _page) = watch::channel(Arc::new(Snapshot::default()));
@@ -76,20 +76,21 @@ impl Live {
             time_s: (time_us - first_us) as f64 * 1e-6,
             solution,
         };
-        let answers = kept.into_iter().map(answer).filter(|answer| answer.time_s > SETTLED_S).collect();
-        Self { answers, summary, recording, scene }
+        let answers = kept.into_iter().map(answer).filter(|answer| answer.time_s > counted_s[0]).collect();
+        Self { answers, summary, recording, scene, counted_s }
     }
 
     /// Whether there was an answer as often as answers take, soon after the start and then without a gap, and none was old: 50 ms or what an
     /// answer takes, whichever is longer, and twice that on a busy machine. A scene that is no few contacts is searched for longer, in which
     /// there may be a gap of [`SEARCH_S`], and fewer answers.
-    pub fn is_timely(&self, seconds: f64) -> bool {
+    pub fn is_timely(&self) -> bool {
+        let [from_s, to_s] = self.counted_s;
         let answer_s = 1e-6 * self.summary.latency_us.p99.max(833.0);
         let longest_s = 2.0 * answer_s.max(0.05);
         let times = self.answers.iter().map(|answer| answer.time_s);
-        let first = times.clone().next().is_some_and(|first_s| first_s < SETTLED_S + SEARCH_S);
+        let first = times.clone().next().is_some_and(|first_s| first_s < from_s + SEARCH_S);
         let gaps = times.clone().zip(times.skip(1)).map(|(a, b)| b - a).fold(0.0, f64::max);
-        let enough = self.answers.len() as f64 > 0.1 * (seconds - SETTLED_S) / answer_s;
+        let enough = self.answers.len() as f64 > 0.1 * (to_s - from_s) / answer_s;
         first && enough && gaps < SEARCH_S + answer_s && self.summary.age_us.p99 * 1e-6 < longest_s
     }
 
