@@ -8,8 +8,6 @@
     reason = "they panic where a pipe is closed; see tactomo_cli::output"
 )]
 
-#[cfg(feature = "ablation")]
-mod ablate;
 mod commands;
 mod heap;
 mod live;

@@ -1,7 +1,5 @@
 //! The commands, one file each: its arguments and what it does.
 
-#[cfg(feature = "ablation")]
-mod ablate;
 mod bank;
 mod design;
 mod learn;
@@ -34,8 +32,6 @@ enum Command {
     Live(live::Args),
     Learn(learn::Args),
     Score(score::Args),
-    #[cfg(feature = "ablation")]
-    Ablate(ablate::Args),
 }
 
 /// Runs the command that was asked for.
@@ -50,8 +46,6 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Live(args) => live::run(&args),
         Command::Learn(args) => learn::run(&args),
         Command::Score(args) => score::run(&args),
-        #[cfg(feature = "ablation")]
-        Command::Ablate(args) => ablate::run(&args),
     }
 }
 

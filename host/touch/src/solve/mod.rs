@@ -41,12 +41,8 @@ pub use self::before::adaptive_mean::AdaptiveMean;
 pub(crate) use self::before::adaptive_mean::rounding_v;
 pub use self::before::latest::Latest;
 pub use self::compiled::{CompileError, CompiledTable, TableFileError};
-#[cfg(feature = "ablation")]
-pub use self::fit::ablation::Threshold;
 pub use self::fit::interpolate::Interpolation;
 pub use self::fit::lambda::{Lambda, UnknownLambda};
-#[cfg(feature = "ablation")]
-pub use self::fit::policy::all as thresholds;
 pub use self::health::electrodes::faulty_electrodes;
 pub(crate) use self::health::electrodes::{Pair as PairOfLoads, loads};
 pub use self::health::table::{TableDoubt, table_doubt};

@@ -31,7 +31,7 @@ struct Track {
 impl Track {
     /// Where it is expected in the next frame (m).
     fn expected_m(&self) -> Place {
-        let frames = f64::from(self.missed + 1).min(policy::coasting_frames());
+        let frames = f64::from(self.missed + 1).min(policy::COASTING_FRAMES);
         std::array::from_fn(|axis| self.place_m[axis] + frames * self.way_m[axis])
     }
 
@@ -61,7 +61,7 @@ impl Association {
         for (track, seen) in self.tracks.iter_mut().zip(seen) {
             track.missed += u32::from(!seen);
         }
-        self.tracks.retain(|track| track.missed <= policy::lost_frames());
+        self.tracks.retain(|track| track.missed <= policy::LOST_FRAMES);
         for contact in contacts.iter_mut().filter(|contact| contact.id.is_none()) {
             contact.id = Some(self.next);
             self.tracks.push(Track { id: self.next, place_m: place_m(contact), way_m: [0.0; 3], missed: 0 });
@@ -135,9 +135,9 @@ mod tests {
     fn a_contact_that_is_lost_for_a_moment_keeps_its_number() {
         let mut association = Association::new(0.010);
         assert_eq!(ids(&mut association, &[0.0, 0.030]), [1, 2]);
-        (0..policy::lost_frames()).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
+        (0..policy::LOST_FRAMES).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
         assert_eq!(ids(&mut association, &[0.030, 0.001]), [2, 1], "lost for a moment");
-        (0..=policy::lost_frames()).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
+        (0..=policy::LOST_FRAMES).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
         assert_eq!(ids(&mut association, &[0.030, 0.001]), [2, 3], "lost for long");
         // What is seen goes on before what is lost comes back, however near.
         assert_eq!(ids(&mut association, &[0.002]), [3]);

@@ -187,16 +187,16 @@ impl AdaptiveMean {
         let all = self.frames();
         for newest in windows(all) {
             let difference = self.difference(newest, moves);
-            let alarm = -2.0 * (policy::false_alarms() * newest as f64).ln();
+            let alarm = -2.0 * (policy::FALSE_ALARMS * newest as f64).ln();
             // A reading that is no voltage of a board makes sums that nothing can be concluded from.
             if difference.overall.is_nan()
-                || difference.overall > policy::misfit_deviations()
+                || difference.overall > policy::MISFIT_DEVIATIONS
                 || difference.of_contacts > alarm
             {
                 self.begin_with_newest(newest);
                 return;
             }
-            self.has_moved |= difference.of_contacts > -2.0 * policy::false_doubts().ln() && newest == all / 2;
+            self.has_moved |= difference.of_contacts > -2.0 * policy::FALSE_DOUBTS.ln() && newest == all / 2;
         }
     }
 

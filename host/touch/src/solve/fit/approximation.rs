@@ -52,7 +52,7 @@ pub(crate) struct About {
 
 impl Default for About {
     fn default() -> Self {
-        Self { near: None, leakage_sheets: policy::leakage_sheets() }
+        Self { near: None, leakage_sheets: policy::LEAKAGE_SHEETS }
     }
 }
 
@@ -209,12 +209,12 @@ impl ApproximationError {
 
     /// Whether other readings (V) would have other patterns.
     pub fn is_stale(&self, volts: &[f64]) -> bool {
-        self.is_moved(volts, policy::stale_share())
+        self.is_moved(volts, policy::STALE_SHARE)
     }
 
     /// Whether other readings (V) are those that the patterns are of, as near as a search needs.
     pub fn is_settled(&self, volts: &[f64]) -> bool {
-        !self.is_moved(volts, policy::settled_share())
+        !self.is_moved(volts, policy::SETTLED_SHARE)
     }
 
     fn is_moved(&self, volts: &[f64], share: f64) -> bool {

@@ -19,7 +19,7 @@ impl Evidence {
     /// Of so many parameters, each of which has the same price.
     pub fn of(cost: f64, parameters: usize) -> Self {
         let parameters = parameters as f64;
-        Self { cost, price: policy::parameter_price() * parameters, parameters }
+        Self { cost, price: policy::PARAMETER_PRICE * parameters, parameters }
     }
 
     /// The sum of squares with the price: of two explanations the lower one is believed.
@@ -34,13 +34,13 @@ impl Evidence {
 
     /// Whether more is left of so many readings than noise and the model's error make.
     pub fn is_misfit(&self, readings: usize) -> bool {
-        self.exceeds(1.0, policy::misfit_deviations(), readings)
+        self.exceeds(1.0, policy::MISFIT_DEVIATIONS, readings)
     }
 
     /// Whether more is left than noise alone makes, whose variance is this share of that of the errors: a model that is righter than it claims
     /// could do better.
     pub fn may_be_better(&self, noise_share: f64, readings: usize) -> bool {
-        self.exceeds(noise_share, policy::doubt_deviations(), readings)
+        self.exceeds(noise_share, policy::DOUBT_DEVIATIONS, readings)
     }
 
     fn exceeds(&self, share: f64, deviations: f64, readings: usize) -> bool {
@@ -51,7 +51,7 @@ impl Evidence {
 
 /// Mean square of what is left, in what noise and model error make, above which readings do not fit.
 pub(crate) fn misfit_limit(freedom: f64) -> f64 {
-    limit(policy::misfit_deviations(), freedom)
+    limit(policy::MISFIT_DEVIATIONS, freedom)
 }
 
 /// The mean of `freedom` squares of normal numbers is 1, and its variance two over their number.
@@ -71,7 +71,7 @@ impl Searched {
 
     /// Whether much more is left of a frame.
     pub fn is_worse(&self, now: Evidence, readings: usize) -> bool {
-        now.cost > (policy::worse() * self.0).max(readings as f64)
+        now.cost > (policy::WORSE * self.0).max(readings as f64)
     }
 }
 

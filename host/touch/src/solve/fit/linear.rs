@@ -111,7 +111,7 @@ pub(crate) fn sources_of_nodes(jacobian: &Jacobian) -> DMatrix<f64> {
 
 /// Smallest reading (V) that says nothing.
 pub(crate) fn full_v(detector: &Detector) -> f64 {
-    policy::full_share() * detector.adc.full_scale_v.min(detector.drive_v)
+    policy::FULL_SHARE * detector.adc.full_scale_v.min(detector.drive_v)
 }
 
 /// Singular images that are added together: a pass over the image costs more than its sums.
@@ -199,8 +199,8 @@ impl LinearImage {
     pub fn flags(&self, readings: &Readings, spectrum: &Spectrum) -> Flags {
         let beyond = |volts: f64| volts.abs() > self.drive_v;
         let outside_v2 = spectrum.noise_v2();
-        let misfit = spectrum.outside() > policy::outside_share()
-            && outside_v2.sqrt() > policy::doubt_deviations() * self.noise_v;
+        let misfit =
+            spectrum.outside() > policy::OUTSIDE_SHARE && outside_v2.sqrt() > policy::DOUBT_DEVIATIONS * self.noise_v;
         Flags {
             saturated: readings.largest_v() >= self.full_v,
             misfit: misfit || readings.volts().iter().copied().any(beyond),

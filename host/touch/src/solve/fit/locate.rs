@@ -33,7 +33,7 @@ impl Locator {
             neighbours: Neighbours::of(mesh),
             areas_m2: mesh.node_areas_m2.clone(),
             apart_m: (area_m2 / detector.electrodes.len() as f64).sqrt(),
-            rest_v: policy::misfit_deviations() * detector.adc.deviation_v(),
+            rest_v: policy::MISFIT_DEVIATIONS * detector.adc.deviation_v(),
         }
     }
 
@@ -60,7 +60,7 @@ impl Locator {
 
     /// Nodes that are highest within half of `apart_m` and apart from higher peaks, the highest first.
     fn peak_nodes(&self, image: &[f32]) -> Vec<usize> {
-        let mut tops = self.tops(image, policy::peak_share() * highest(image));
+        let mut tops = self.tops(image, policy::PEAK_SHARE * highest(image));
         tops.sort_unstable_by(|&a, &b| image[b].total_cmp(&image[a]));
         let mut peaks: Vec<usize> = Vec::new();
         for node in tops {
@@ -108,7 +108,7 @@ impl Locator {
     fn contact_at(&self, image: &[f32], peak: usize, own: impl Fn(usize) -> bool) -> Option<FoundContact> {
         let near_m2 = (0.75 * self.apart_m).powi(2);
         let near = |node: usize| own(node) && self.distance_m2(node, peak) < near_m2;
-        let place = self.centroid(image, near, policy::peak_share() * image[peak])?;
+        let place = self.centroid(image, near, policy::PEAK_SHARE * image[peak])?;
         Some(FoundContact { conductance_s: self.conductance_s(image, own), ..place })
     }
 

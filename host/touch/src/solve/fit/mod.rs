@@ -1,6 +1,5 @@
 //! How numbers are fitted to readings: what several methods share.
 
-pub(crate) mod ablation;
 pub(crate) mod approximation;
 pub(crate) mod balance;
 pub(crate) mod dot;

@@ -110,7 +110,7 @@ impl Look {
                 let others = faulty.but(&pair);
                 let kept = others.kept(problem.detector().electrodes.len());
                 let left = one_contact(problem, &kept, &others)?.left_by_one(&readings.of(&kept))?;
-                (left < policy::wrong_mean_square()).then_some(pair)
+                (left < policy::WRONG_MEAN_SQUARE).then_some(pair)
             }
         }
     }
@@ -131,7 +131,7 @@ fn exchanged(problem: &Problem, faulty: &FaultyElectrodes, readings: &Readings) 
         order
     };
     let roughly = |order: &[usize]| contacts.roughly_left_by_one(&readings.of(order));
-    let most = policy::healed_share_roughly() * roughly(&kept);
+    let most = policy::HEALED_SHARE_ROUGHLY * roughly(&kept);
     let pairs = (0..kept.len()).flat_map(|i| (0..i).map(move |j| [j, i]));
     let mut tried: Vec<_> =
         pairs.map(|pair| (roughly(&exchanging(pair)), pair)).filter(|(left, _)| *left < most).collect();
@@ -147,7 +147,7 @@ fn exchanged(problem: &Problem, faulty: &FaultyElectrodes, readings: &Readings) 
     }
     let scored = tried.iter().take(TRIED).filter_map(|(_, pair)| Some((residual(&exchanging(*pair))?, *pair)));
     let (after, pair) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (after < policy::wrong_mean_square() && after < policy::healed_share() * before)
+    (after < policy::WRONG_MEAN_SQUARE && after < policy::HEALED_SHARE * before)
         .then_some(pair.map(|place| kept[place]))
 }
 

@@ -32,7 +32,7 @@ impl Unexplained {
             None if says_nothing => size_v,
             None => 0.0,
         };
-        if self.is_large(left_v, policy::left_share() * size_v) || self.are_below_rest(readings) {
+        if self.is_large(left_v, policy::LEFT_SHARE * size_v) || self.are_below_rest(readings) {
             solution.doubt();
         }
         solution
@@ -40,11 +40,11 @@ impl Unexplained {
 
     /// Whether much of the readings is below those at rest.
     fn are_below_rest(&self, readings: &Readings) -> bool {
-        self.is_large(readings.rms_below_rest_v(), policy::outside_share() * readings.rms_v())
+        self.is_large(readings.rms_below_rest_v(), policy::OUTSIDE_SHARE * readings.rms_v())
     }
 
     fn is_large(&self, volts: f64, least_v: f64) -> bool {
-        volts > policy::misfit_deviations() * self.noise_v && volts > least_v
+        volts > policy::MISFIT_DEVIATIONS * self.noise_v && volts > least_v
     }
 }
 

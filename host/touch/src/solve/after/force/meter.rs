@@ -90,10 +90,9 @@ impl Meter {
         let spots: Vec<LoadedSpot> = spots.map(|spot| LoadedSpot { spot, ohm: 0.0 }).collect();
         // From what the solver found, which makes no difference but to the time.
         let start = |contact: &FoundContact| {
-            let own_s = contact.conductance_s.clamp(
-                policy::conductances_sheets()[0] * self.sheet_s,
-                policy::conductances_sheets()[1] * self.sheet_s,
-            );
+            let own_s = contact
+                .conductance_s
+                .clamp(policy::CONDUCTANCES_SHEETS[0] * self.sheet_s, policy::CONDUCTANCES_SHEETS[1] * self.sheet_s);
             self.held((self.constriction_ohm + 1.0 / own_s).ln())
         };
         let mut descent = Descent { meter: self, spots, readings };
@@ -165,7 +164,7 @@ impl Meter {
 
     /// The logarithm of a resistance within what makes sense.
     fn held(&self, log: f64) -> f64 {
-        let [least, most] = policy::conductances_sheets().map(|sheets| (sheets * self.sheet_s).ln());
+        let [least, most] = policy::CONDUCTANCES_SHEETS.map(|sheets| (sheets * self.sheet_s).ln());
         log.clamp(-most, -least)
     }
 }

@@ -131,7 +131,7 @@ impl AutoSearch {
         // Of a provisional target nothing is claimed that another model could do better than.
         let noise_share = if target.is_provisional() { 1.0 } else { (target.noise_v / target.deviation_v()).powi(2) };
         let count = solution.contacts.len();
-        let is_doubtful = count >= policy::suspicious_contacts() && best.may_be_better(noise_share, target.count());
+        let is_doubtful = count >= policy::SUSPICIOUS_CONTACTS && best.may_be_better(noise_share, target.count());
         // As many as are looked for stand for more.
         let is_full = self.finder.as_ref().is_some_and(|finder| count >= finder.most());
         if !(is_doubtful || is_full || best.is_misfit(target.count())) {

@@ -69,7 +69,7 @@ impl AutoTracker {
             answer: Answer::Contacts,
             rival: None,
             skip: 0,
-            patience: policy::image_patience()[0],
+            patience: policy::IMAGE_PATIENCE[0],
         }
     }
 
@@ -132,11 +132,11 @@ impl AutoTracker {
             solution.contacts = contacts.solution(target).contacts;
             let by_shape = self.shapes.as_ref().and_then(ShapeTracker::evidence).filter(|_| solution.shape.is_some());
             if let (Some(by_shape), false) = (by_shape, solution.flags.is_doubtful()) {
-                let untried = if target.error().is_some() { policy::untried_share() } else { 0.0 };
+                let untried = if target.error().is_some() { policy::UNTRIED_SHARE } else { 0.0 };
                 let share = by_shape.share_against(&contacts.evidence(target));
                 let other = Alternative { contacts: solution.contacts.len(), certainty: 1.0 - share };
                 solution.certainty = Some(share.min(1.0 - untried));
-                solution.alternative = Some(other).filter(|other| other.certainty >= policy::named_share());
+                solution.alternative = Some(other).filter(|other| other.certainty >= policy::NAMED_SHARE);
             }
         }
         as_whole(solution, why)
@@ -182,11 +182,11 @@ impl AutoTracker {
         match &answer {
             Answer::Image(_) => {
                 self.skip = self.patience;
-                self.patience = (2 * self.patience).min(policy::image_patience()[1]);
+                self.patience = (2 * self.patience).min(policy::IMAGE_PATIENCE[1]);
             }
             _ => {
                 self.image.go_on_from(None);
-                (self.skip, self.patience) = (0, policy::image_patience()[0]);
+                (self.skip, self.patience) = (0, policy::IMAGE_PATIENCE[0]);
             }
         }
         self.answer = answer;

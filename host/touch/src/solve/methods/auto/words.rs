@@ -9,11 +9,11 @@ pub(super) fn as_contacts(mut solution: Solution, rival: Option<Rival>, search: 
     if solution.contacts.is_empty() {
         return nothing(solution, search);
     }
-    let rival = rival.filter(|rival| solution.certainty.is_some() && rival.share >= policy::named_share());
+    let rival = rival.filter(|rival| solution.certainty.is_some() && rival.share >= policy::NAMED_SHARE);
     let share = 1.0 - rival.map_or(0.0, |rival| rival.share);
     solution.certainty = solution.certainty.map(|certainty| share * certainty);
     let of_less = |other: Alternative| Alternative { certainty: share * other.certainty, ..other };
-    solution.alternative = solution.alternative.map(of_less).filter(|other| other.certainty >= policy::named_share());
+    solution.alternative = solution.alternative.map(of_less).filter(|other| other.certainty >= policy::NAMED_SHARE);
     let found = solution.contacts.len();
     let what =
         either(found, solution.alternative) + &rival.map(|rival| format!(" or a {}", rival.name)).unwrap_or_default();

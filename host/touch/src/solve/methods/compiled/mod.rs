@@ -188,7 +188,7 @@ fn core_says(says: Says) -> CoreSays {
 /// The likeliest other number of contacts, if that is worth to be named.
 fn alternative(answer: &Answer<f64, MOST_CONTACTS>) -> Option<Alternative> {
     let (contacts, certainty) = answer.certainty?.other?;
-    Some(Alternative { contacts, certainty }).filter(|other| other.certainty >= policy::named_share())
+    Some(Alternative { contacts, certainty }).filter(|other| other.certainty >= policy::NAMED_SHARE)
 }
 
 fn solution(answer: &Answer<f64, MOST_CONTACTS>) -> Solution {
@@ -212,7 +212,7 @@ fn found(contact: &Contact<f64>) -> FoundContact {
     let [x_m, y_m] = contact.sigma_m.map(f64::from);
     let uncertainty =
         Uncertainty { x_m, y_m, correlation: contact.correlation, conductance_s: contact.conductance_sigma_s };
-    let is_known = contact.radius_sigma_m / contact.radius_m < policy::known_radius_deviation();
+    let is_known = contact.radius_sigma_m / contact.radius_m < policy::KNOWN_RADIUS_DEVIATION;
     FoundContact {
         apparent_conductance_s: Some(contact.apparent_conductance_s),
         radius_m: is_known.then_some(contact.radius_m),

@@ -22,7 +22,7 @@ use crate::solve::fit::dot::dot;
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 
-/// Patterns are made anew once readings have changed by this part of what makes them [stale](policy::stale_share).
+/// Patterns are made anew once readings have changed by this part of what makes them [stale](policy::STALE_SHARE).
 const RENEWED: f64 = 0.5;
 
 /// What all readings are off by, of a detector that is not known exactly; nothing of one that is.
@@ -66,7 +66,7 @@ impl Steps {
 impl Discrepancy {
     /// Takes note of the readings that contacts predict now (V).
     pub fn follow(&mut self, volts: &[f64]) {
-        self.changed = (change(&self.made_for, volts) / policy::stale_share()).min(1.0);
+        self.changed = (change(&self.made_for, volts) / policy::STALE_SHARE).min(1.0);
     }
 
     /// Whether its patterns are to be made anew.
@@ -76,7 +76,7 @@ impl Discrepancy {
 
     /// Whether contacts have gone so far that a whole frame has to tell anew, where they predict such readings (V).
     pub fn is_stale(&self, volts: &[f64]) -> bool {
-        change(&self.found_with, volts) >= policy::stale_share()
+        change(&self.found_with, volts) >= policy::STALE_SHARE
     }
 
     /// Whether the detector is known exactly.

@@ -299,8 +299,8 @@ impl DiscFitter<'_> {
     /// Mean and standard deviation of the logarithm of a contact's conductance (S) before anything is read.
     pub fn usual_strength(&self, still: Option<&Still>, k: usize) -> [f64; 2] {
         match still {
-            Some(still) => [still.level(k), policy::strength_deviation()],
-            None => [self.sheet_s.ln(), policy::conductance_deviation()],
+            Some(still) => [still.level(k), policy::STRENGTH_DEVIATION],
+            None => [self.sheet_s.ln(), policy::CONDUCTANCE_DEVIATION],
         }
     }
 
@@ -365,7 +365,7 @@ impl DiscFitter<'_> {
 
     /// A contact with conductance and radius held within what makes sense.
     pub fn held(&self, contact: Contact) -> Contact {
-        let [least, most] = policy::conductances_sheets().map(|sheets| sheets * self.sheet_s);
+        let [least, most] = policy::CONDUCTANCES_SHEETS.map(|sheets| sheets * self.sheet_s);
         Contact {
             conductance_s: contact.conductance_s.clamp(least, most),
             radius_m: contact.radius_m.clamp(NARROWEST * self.usual_radius_m, self.widest_m),

@@ -12,13 +12,13 @@ pub(super) struct Doubt(f64);
 impl Doubt {
     /// Rows that come `elapsed_s` (s) after those before fit what is followed, or do not.
     pub fn rows(&mut self, fit: bool, elapsed_s: f64) {
-        let change_s = if fit { -elapsed_s } else { policy::unfit_weight() * elapsed_s };
-        self.0 = (self.0 + change_s).clamp(0.0, 2.0 * policy::unfit_s());
+        let change_s = if fit { -elapsed_s } else { policy::UNFIT_WEIGHT * elapsed_s };
+        self.0 = (self.0 + change_s).clamp(0.0, 2.0 * policy::UNFIT_S);
     }
 
     /// A whole frame fits, or does not.
     pub fn whole(&mut self, fits: bool) {
-        self.0 = if fits { 0.0 } else { policy::unfit_s() };
+        self.0 = if fits { 0.0 } else { policy::UNFIT_S };
     }
 
     /// A search has found fewer or more contacts than were followed: that did not show in rows, or not soon.
@@ -28,7 +28,7 @@ impl Doubt {
 
     /// Whether whole frames are needed.
     pub fn needs_whole(self) -> bool {
-        self.0 >= policy::unfit_s()
+        self.0 >= policy::UNFIT_S
     }
 }
 

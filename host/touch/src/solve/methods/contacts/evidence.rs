@@ -41,7 +41,7 @@ impl Prior {
     /// unit (m), and the logarithm of the resistance of contact and crowded current, `over_contact` times the contact's own. Its radius is
     /// what it was before anything was read.
     pub fn ln_of_one_more(&self, number: usize, unit_m: f64, over_contact: f64) -> f64 {
-        -self.area_m2.ln() - policy::conductance_deviation().ln() + TAU.ln() - policy::fewer_nats()
+        -self.area_m2.ln() - policy::CONDUCTANCE_DEVIATION.ln() + TAU.ln() - policy::FEWER_NATS
             + 2.0 * unit_m.ln()
             + over_contact.ln()
             + (number as f64).ln()
@@ -57,8 +57,7 @@ impl Prior {
     pub fn ln_evidence(&self, fit: &DiscFit) -> f64 {
         let Some(factor) = Cholesky::new(fit.normal.clone()) else { return f64::NEG_INFINITY };
         let count = fit.contacts.len();
-        let deviation =
-            if fit.still.is_some() { policy::strength_deviation() } else { policy::conductance_deviation() };
+        let deviation = if fit.still.is_some() { policy::STRENGTH_DEVIATION } else { policy::CONDUCTANCE_DEVIATION };
         let peak = -(deviation * TAU.sqrt()).ln();
         let peak_of_staying = match &fit.still {
             Some(still) => still.ln_peak(&fit.units_m()),
@@ -67,7 +66,7 @@ impl Prior {
         let from_logs: f64 = (0..count).map(|k| fit.constriction(k).ln_1p()).sum();
         let orders: f64 = (1..=count).map(|k| (k as f64).ln()).sum();
         -0.5 * (fit.cost + fit.known)
-            + count as f64 * (peak - policy::fewer_nats())
+            + count as f64 * (peak - policy::FEWER_NATS)
             + peak_of_staying
             + from_logs
             + orders

@@ -223,7 +223,7 @@ impl ContactFinder {
         let one = self.one(&rough)?;
         let pairs = self.pairs(&one, &rough);
         let begun = self.grow(one, pairs, &rough, &mut |_| ControlFlow::Continue(()));
-        if begun.fit.contacts.len() > policy::suspicious_contacts() {
+        if begun.fit.contacts.len() > policy::SUSPICIOUS_CONTACTS {
             return None;
         }
         let target = self.informed(target, &begun.fit.contacts, &About::default())?;
@@ -256,7 +256,7 @@ impl ContactFinder {
         for renewal in 0..RENEWALS {
             let Informed { hypothesis, target } = &found;
             // What contacts are missing for says nothing of the detector.
-            let is_hopeless = hypothesis.fit.cost > policy::wrong_mean_square() * target.count() as f64
+            let is_hopeless = hypothesis.fit.cost > policy::WRONG_MEAN_SQUARE * target.count() as f64
                 || self.is_misfit(&hypothesis.fit, target) && self.is_widest(hypothesis);
             let nearer = self.nearer(&hypothesis.fit, target, is_hopeless);
             let is_settled = target.error().is_none_or(|error| error.is_settled(&hypothesis.fit.volts));
@@ -403,8 +403,8 @@ impl ContactFinder {
         let about = &target.error()?.about;
         let near = if is_hopeless { None } else { self.nearer_detector(fit, target) };
         let seen = target.leakage(&fit.volts)?;
-        let says = !is_hopeless || seen.squares > policy::leakage_share() * fit.cost;
-        let sheets = seen.sheets.max(policy::leakage_sheets());
+        let says = !is_hopeless || seen.squares > policy::LEAKAGE_SHARE * fit.cost;
+        let sheets = seen.sheets.max(policy::LEAKAGE_SHEETS);
         let is_other = says && (sheets / about.leakage_sheets).ln().abs() > LEAKAGE_FACTOR.ln();
         let leakage_sheets = if is_other { sheets } else { about.leakage_sheets };
         (near.is_some() || is_other).then(|| About { near: near.or_else(|| about.near.clone()), leakage_sheets })

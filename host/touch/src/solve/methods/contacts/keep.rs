@@ -65,7 +65,7 @@ impl ContactFinder {
     /// step, however light the contact is to become.
     fn without_lifted(&self, before: &DiscFit, fit: DiscFit, target: &Target) -> DiscFit {
         let is_lighter =
-            |(now, before): &(&Contact, &Contact)| now.conductance_s < policy::lifted_share() * before.conductance_s;
+            |(now, before): &(&Contact, &Contact)| now.conductance_s < policy::LIFTED_SHARE * before.conductance_s;
         let pairs = fit.contacts.iter().zip(&before.contacts).enumerate();
         let kept: Vec<_> = pairs.filter(|(_, pair)| !is_lighter(pair)).map(|(k, _)| k).collect();
         if kept.is_empty() || kept.len() == fit.contacts.len() {
@@ -89,9 +89,8 @@ impl ContactFinder {
         let covariance = fit.covariance();
         let is_weak = |k: &usize| {
             let log = PARAMETERS * k + 2;
-            let is_unsure = covariance
-                .as_ref()
-                .is_none_or(|all| all[(log, log)] > policy::weak_deviation() * policy::weak_deviation());
+            let is_unsure =
+                covariance.as_ref().is_none_or(|all| all[(log, log)] > policy::WEAK_DEVIATION * policy::WEAK_DEVIATION);
             is_unsure && fit.contacts[*k].conductance_s < self.sheet_s
         };
         (0..fit.contacts.len()).filter(is_weak).collect()
@@ -101,5 +100,5 @@ impl ContactFinder {
 /// Nats by which contacts of a fit have to be less likely than fewer to be let go: what several frames say is not forgotten for what one of them does not
 /// need.
 pub(super) fn needed(fit: &DiscFit) -> f64 {
-    if fit.still.is_some() { policy::gone_nats() } else { 0.0 }
+    if fit.still.is_some() { policy::GONE_NATS } else { 0.0 }
 }

@@ -106,7 +106,7 @@ pub fn contact_over_needed(readings: &Readings, model: &dyn ForwardModel) -> f64
     balance(&mut volts, n, detector.drive_v);
     let is_read = |index: &usize| readings.says(index / n, index % n) == Says::Voltage;
     let square_v2: f64 = (0..n * n).filter(is_read).map(|index| volts[index] * volts[index]).sum();
-    square_v2 / (deviation_v * deviation_v * policy::first_gain())
+    square_v2 / (deviation_v * deviation_v * policy::FIRST_GAIN)
 }
 
 /// What finds contacts: the same for all frames, and shared by the threads that follow and search.
@@ -159,7 +159,7 @@ impl Certainty {
     fn of(count: usize, by_count: &[f64], is_exact: bool) -> Option<Self> {
         let [more_nat, untried] = match is_exact {
             true => [1.0, 0.0],
-            false => [policy::more_contacts_nat(), policy::untried_share()],
+            false => [policy::MORE_CONTACTS_NAT, policy::UNTRIED_SHARE],
         };
         let nat = |other: usize| if other > count { more_nat } else { 1.0 };
         let shares = || by_count.iter().enumerate().map(|(other, ln)| (nat(other) * (ln - by_count[count])).exp());
@@ -167,7 +167,7 @@ impl Certainty {
         let others = shares().enumerate().filter(|(other, _)| *other != count);
         let other = others.max_by(|(_, a), (_, b)| a.total_cmp(b));
         let other = other.map(|(contacts, of)| Alternative { contacts, certainty: of * share });
-        Some(Self { share, alternative: other.filter(|other| other.certainty >= policy::named_share()) })
+        Some(Self { share, alternative: other.filter(|other| other.certainty >= policy::NAMED_SHARE) })
     }
 }
 
@@ -352,7 +352,7 @@ impl ContactFinder {
             logs.iter().enumerate().map(|(k, logs)| self.contact(fit, k, covariance.as_ref().zip(*logs))).collect();
         self.add_unseen_scale(fit, &mut contacts);
         // A standard error more and it is as firm as makes a difference.
-        let perfect = (policy::conductances_sheets()[1] * self.sheet_s).ln();
+        let perfect = (policy::CONDUCTANCES_SHEETS[1] * self.sheet_s).ln();
         let is_perfect = |logs: &Option<Logs>| {
             logs.is_some_and(|Logs { conductance: [mean, deviation], .. }| mean + deviation > perfect)
         };
@@ -379,7 +379,7 @@ impl ContactFinder {
             Uncertainty { conductance_s, ..place_uncertainty(fit, k, &covariance) }
         });
         let radius =
-            known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < policy::known_radius_deviation());
+            known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < policy::KNOWN_RADIUS_DEVIATION);
         let [x_m, y_m, z_m] = near_edge.map_or(place_m(&contact), |place| {
             let (along, unit_m) = fit.along(k);
             self.fields.footing(space::moved(place_m(&contact), (unit_m * place.mean).into(), along)).0
@@ -415,8 +415,8 @@ impl ContactFinder {
             (0..fit.contacts.len()).map(of).map(|place| place.x_m.max(place.y_m)).fold(0.0, f64::max)
         };
         let [now_m, exact_m] = [&fit.covariance()?, &known].map(largest_m);
-        let calibrated_m = exact_m.hypot(policy::calibrated_share() * self.spacing_m);
-        let worth_m = (policy::calibration_worth() * calibrated_m).max(policy::known_share() * self.spacing_m);
+        let calibrated_m = exact_m.hypot(policy::CALIBRATED_SHARE * self.spacing_m);
+        let worth_m = (policy::CALIBRATION_WORTH * calibrated_m).max(policy::KNOWN_SHARE * self.spacing_m);
         (is_off && now_m > worth_m).then_some(Calibrated { now_m, calibrated_m })
     }
 
@@ -426,7 +426,7 @@ impl ContactFinder {
         let usual = Usual {
             conductance_s: ln_conductance.exp(),
             conductance_deviation,
-            most_s: policy::conductances_sheets()[1] * self.sheet_s,
+            most_s: policy::CONDUCTANCES_SHEETS[1] * self.sheet_s,
             radius_m: self.settings.radius_m,
             radius_deviation: self.settings.radius_deviation,
         };

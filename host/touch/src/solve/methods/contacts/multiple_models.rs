@@ -179,8 +179,8 @@ impl MultipleModels {
         self.best = likelihoods.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(best, _)| best);
         let believed = self.filters[self.best].clone();
         for filter in &mut self.filters {
-            if filter.likelihood < believed.likelihood - policy::gone_nats() {
-                let likelihood = believed.likelihood - policy::gone_nats();
+            if filter.likelihood < believed.likelihood - policy::GONE_NATS {
+                let likelihood = believed.likelihood - policy::GONE_NATS;
                 *filter = Filter { likelihood, ..believed.clone() };
             }
             filter.mean -= &believed.mean;

@@ -100,14 +100,14 @@ impl ContactFinder {
         }
         let Some(mut fit) = self.moved_by(last.fit.clone(), &mut state.filters, target) else { return Step::Lost };
         let counted = target.at(&fit.volts).count() as f64;
-        let noise = counted + policy::misfit_deviations() * (2.0 * counted).sqrt();
+        let noise = counted + policy::MISFIT_DEVIATIONS * (2.0 * counted).sqrt();
         state.unfit = if fit.cost > noise { state.unfit + 1 } else { 0 };
         // What is gone shows in the rows alone: what they say for it is what a contact of that kind would have taken off.
         state.gone = (state.gone + 0.5 * (fit.cost - target.cost_of_nothing())).max(0.0);
-        if state.gone > policy::gone_nats() || self.is_vanishing(&fit) {
+        if state.gone > policy::GONE_NATS || self.is_vanishing(&fit) {
             return Step::Gone;
         }
-        let search = state.unfit >= policy::unfit_frames();
+        let search = state.unfit >= policy::UNFIT_FRAMES;
         state.discrepancy.follow(&fit.volts);
         if state.discrepancy.is_outdated() {
             state.discrepancy = self.discrepancy_at(&state.discrepancy, &fit).unwrap_or(state.discrepancy);
@@ -124,7 +124,7 @@ impl ContactFinder {
     /// pattern.
     pub(super) fn glimpsed(&self, target: &Target) -> Option<ContactHypothesis> {
         let found = self.roughly_from(self.begun(target)?, target)?;
-        (target.cost_of_nothing() - found.fit.cost >= policy::first_gain()).then_some(found)
+        (target.cost_of_nothing() - found.fit.cost >= policy::FIRST_GAIN).then_some(found)
     }
 
     /// What these contacts are in another frame, roughly.
@@ -137,7 +137,7 @@ impl ContactFinder {
 
     /// Whether what is followed has become so light that it cannot be distinguished from nothing.
     fn is_vanishing(&self, fit: &DiscFit) -> bool {
-        let least_s = policy::vanishing_sheets() * self.sheet_s;
+        let least_s = policy::VANISHING_SHEETS * self.sheet_s;
         fit.contacts.iter().all(|contact| contact.conductance_s < least_s)
     }
 

@@ -49,7 +49,7 @@ impl ContactFinder {
     /// Whether there is any contact at all, as far as single ones tell.
     pub fn stands_out(&self, target: &Target) -> bool {
         let looks = self.looks(target);
-        self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= policy::first_gain())
+        self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= policy::FIRST_GAIN)
     }
 
     /// Starts of two contacts at once, where one leaves a little more than it should, or is wide: then another one far from it may be hidden in how wide it is.
@@ -67,19 +67,19 @@ impl ContactFinder {
     pub(super) fn begun(&self, target: &Target) -> Option<Vec<Contact>> {
         let looks = self.looks(target);
         let best = self.scan.ones(&looks, 1, self.apart_m()).into_iter().next()?;
-        (best.gain >= policy::first_gain()).then(|| self.discs_of(&self.scan.start(&looks, &best)))
+        (best.gain >= policy::FIRST_GAIN).then(|| self.discs_of(&self.scan.start(&looks, &best)))
     }
 
     /// The best single contact, if anything stands out.
     pub(super) fn one(&self, target: &Target) -> Option<DiscFit> {
         let looks = self.looks(target);
         let ones = self.scan.ones(&looks, STARTS, self.apart_m());
-        if ones.first().is_none_or(|best| best.gain < policy::first_gain()) {
+        if ones.first().is_none_or(|best| best.gain < policy::FIRST_GAIN) {
             return None;
         }
         let starts = ones.iter().map(|one| self.discs_of(&self.scan.start(&looks, one)));
         let best = self.best_alone(starts.collect(), target)?;
-        if best.cost > policy::wrong_mean_square() * target.count() as f64 {
+        if best.cost > policy::WRONG_MEAN_SQUARE * target.count() as f64 {
             return Some(best);
         }
         let beside = self.best_alone(self.beside(&best.contacts[0], best.along(0).0), target);
@@ -88,14 +88,14 @@ impl ContactFinder {
 
     /// A fit with radii free, if it is at the widest that is plausible; else what it is.
     fn released(&self, fit: DiscFit, target: &Target) -> DiscFit {
-        let is_wide = |contact: &Contact| contact.radius_m > 0.99 * policy::plausible_radii() * self.settings.radius_m;
+        let is_wide = |contact: &Contact| contact.radius_m > 0.99 * policy::PLAUSIBLE_RADII * self.settings.radius_m;
         if !fit.contacts.iter().any(is_wide) {
             return fit;
         }
         let full = self.disc_fitter();
         let rough = DiscFitter { model: &*self.rough, ..full };
         let free = rough.fit(fit.contacts.clone(), target, ROUGH);
-        let free = free.filter(|free| free.cost < policy::wrong_wide_mean_square() * target.count() as f64);
+        let free = free.filter(|free| free.cost < policy::WRONG_WIDE_MEAN_SQUARE * target.count() as f64);
         let free = free.and_then(|free| full.fit(free.contacts, target, RELEASED));
         free.unwrap_or(fit)
     }
@@ -165,7 +165,7 @@ impl ContactFinder {
 
     /// As many contacts at once as their spots ask for, where those of a fit leave far more than noise.
     pub(super) fn crowd(&self, fit: &DiscFit, target: &Target) -> Option<DiscFit> {
-        if fit.cost < policy::wrong_mean_square() * target.count() as f64 {
+        if fit.cost < policy::WRONG_MEAN_SQUARE * target.count() as f64 {
             return None;
         }
         // A fit that is far off is as wide as it may be, which tells nothing of the contacts that it stands for.
@@ -201,7 +201,7 @@ impl ContactFinder {
     ) -> Result<DiscFit, f64> {
         let looks = self.looks_beside(fit, target);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
-        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::parameter_price())
+        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::PARAMETER_PRICE)
             || self.may_hide_more(fit.contacts.len());
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
             return Err(f64::NEG_INFINITY);
@@ -216,10 +216,10 @@ impl ContactFinder {
         let best = begun.first().ok_or(f64::NEG_INFINITY)?;
         let gain = 0.5 * (fit.cost - best.cost) + spots.ln_of_last(best).unwrap_or(f64::NEG_INFINITY);
         // Of what contacts are not, as a ring, spots tell little.
-        if gain < -policy::modes_nats() && !self.is_misfit(fit, target) {
+        if gain < -policy::MODES_NATS && !self.is_misfit(fit, target) {
             return Err(self.evidence(fit) + gain);
         }
-        let most = best.cost + 2.0 * policy::modes_nats();
+        let most = best.cost + 2.0 * policy::MODES_NATS;
         begun.retain(|start| start.cost <= most);
         begun.truncate(if gain > 0.0 { FINALISTS } else { 1 });
         self.best_of(begun, target).ok_or(f64::NEG_INFINITY)
@@ -244,9 +244,9 @@ impl ContactFinder {
     /// Whether a fit leaves a little more than noise should, or needs a contact as wide as may be.
     pub(super) fn is_doubtful(&self, fit: &DiscFit, target: &Target) -> bool {
         let freedom = self.freedom(fit, target);
-        let widest_m = 0.95 * policy::plausible_radii() * self.settings.radius_m;
+        let widest_m = 0.95 * policy::PLAUSIBLE_RADII * self.settings.radius_m;
         let is_wide = fit.contacts.len() > 1 && fit.contacts.iter().any(|contact| contact.radius_m > widest_m);
-        fit.cost > freedom + policy::doubt_deviations() * (2.0 * freedom).sqrt() || is_wide
+        fit.cost > freedom + policy::DOUBT_DEVIATIONS * (2.0 * freedom).sqrt() || is_wide
     }
 
     /// A more likely fit with one of the contacts taken away and put where it explains most.
@@ -278,7 +278,7 @@ impl ContactFinder {
         let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (a, b)));
         let merged = pairs.filter_map(|(a, b)| {
             let [one, other] = [a, b].map(|k| fit.contacts[k]);
-            let near_m = policy::two_radii() * (one.radius_m + other.radius_m);
+            let near_m = policy::TWO_RADII * (one.radius_m + other.radius_m);
             (space::distance(place_m(&one), place_m(&other)) < near_m).then(|| {
                 let mut merged = without(a);
                 merged[b] = self.merged(&one, &other);
@@ -311,7 +311,7 @@ impl ContactFinder {
 
     pub(super) fn plausible_fitter(&self) -> DiscFitter<'_> {
         let fitter = self.disc_fitter();
-        DiscFitter { widest_m: fitter.widest_m.min(policy::plausible_radii() * self.settings.radius_m), ..fitter }
+        DiscFitter { widest_m: fitter.widest_m.min(policy::PLAUSIBLE_RADII * self.settings.radius_m), ..fitter }
     }
 
     pub(super) fn disc_fitter(&self) -> DiscFitter<'_> {

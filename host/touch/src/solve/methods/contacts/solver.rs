@@ -217,7 +217,7 @@ impl ContactTracker {
         self.is_stale = false;
         let Some(found) = self.finder.without_weak(moved, target) else { return self.finder.stands_out(target) };
         let search = found.fit.cost > self.enough(&found.fit, target)
-            || target.frames >= policy::more_frames() * self.searched.frames
+            || target.frames >= policy::MORE_FRAMES * self.searched.frames
             || target.is_stale(&found.fit.volts)
             || self.finder.is_outdated(target);
         self.keys.take(target, &found.fit, &self.finder);
@@ -283,7 +283,7 @@ impl ContactTracker {
     /// Sum of squares up to which what is followed explains the mean of some frames: what is not noise stands out by their number.
     fn enough(&self, fit: &DiscFit, target: &Target) -> f64 {
         let more = target.frames as f64 / self.searched.frames.max(1) as f64;
-        policy::worse() * (self.finder.freedom(fit, target) + more * self.searched.excess)
+        policy::WORSE * (self.finder.freedom(fit, target) + more * self.searched.excess)
     }
 
     /// What is left of the frames that were followed last, and what that takes; of nothing, all of it.

@@ -98,7 +98,7 @@ impl<'a> SpotFitter<'a> {
         let unit_m = finder.settings.radius_m;
         for i in 0..normal.nrows() {
             let of_place = unit_m * unit_m / finder.prior.place_variance_m2();
-            let of_log = policy::conductance_deviation().powi(-2);
+            let of_log = policy::CONDUCTANCE_DEVIATION.powi(-2);
             normal[(i, i)] += if i % PARAMETERS < 2 { of_place } else { of_log };
         }
         // The last pivots are those of the last contact's parameters, whatever the others' are.
@@ -113,7 +113,7 @@ impl<'a> SpotFitter<'a> {
         let finder = self.finder;
         let begun: Vec<_> = contacts.iter().map(|contact| finder.spot_of(contact)).collect();
         let mut last = self.look(begun.clone())?;
-        let enough = policy::wrong_mean_square() * self.target.count() as f64;
+        let enough = policy::WRONG_MEAN_SQUARE * self.target.count() as f64;
         while last.spots.len() < finder.settings.most && self.sum(&last) > enough {
             let looks: Vec<_> = self.one_more(&last).into_iter().filter_map(|start| self.look(start)).collect();
             let fits: Vec<_> = looks.into_iter().map(|look| minimise(self, look, STEPS, SCHEDULE).at).collect();
@@ -128,7 +128,7 @@ impl<'a> SpotFitter<'a> {
     /// Whether the last spot is no part of a wide contact, which discs have to tell.
     fn is_apart(&self, look: &Look) -> bool {
         let Some((last, others)) = look.spots.split_last() else { return true };
-        let near_m = policy::plausible_radii() * self.finder.settings.radius_m;
+        let near_m = policy::PLAUSIBLE_RADII * self.finder.settings.radius_m;
         others.iter().all(|other| space::distance(last.spot.place_m, other.spot.place_m) > near_m)
     }
 
@@ -250,7 +250,7 @@ impl LeastSquares for SpotFitter<'_> {
             let (from_m, along) = fields.footing(loaded.spot.place_m);
             let unit_m = (LONGEST_WAY / first.hypot(*second)).min(1.0) * self.finder.settings.radius_m;
             let spot = fields.spot(space::moved(from_m, [unit_m * first, unit_m * second], along));
-            let most_ohm = 1.0 / (policy::conductances_sheets()[0] * self.finder.sheet_s);
+            let most_ohm = 1.0 / (policy::CONDUCTANCES_SHEETS[0] * self.finder.sheet_s);
             let ohm = loaded.ohm * log.clamp(-LONGEST_LOG, LONGEST_LOG).exp();
             LoadedSpot { ohm: ohm.clamp(LEAST_OHM * spot.own_ohm, most_ohm), spot }
         };

@@ -26,7 +26,7 @@ impl ContactFinder {
     pub(super) fn may_be_two(&self, fit: &DiscFit) -> Option<usize> {
         let radius_m = |k: usize| fit.contacts[k].radius_m;
         let widest = (0..fit.contacts.len()).max_by(|a, b| radius_m(*a).total_cmp(&radius_m(*b)));
-        widest.filter(|k| radius_m(*k) > policy::two_radii() * self.settings.radius_m)
+        widest.filter(|k| radius_m(*k) > policy::TWO_RADII * self.settings.radius_m)
     }
 
     /// Starts with a wide contact taken for two beside each other, in some directions.
@@ -90,7 +90,7 @@ impl ContactFinder {
         let by_objective = |a: &DiscFit, b: &DiscFit| objective(a).total_cmp(&objective(b));
         let mut fits = Vec::with_capacity(starts.len());
         for fit in starts.into_iter().filter_map(|start| rough.fit(start, target, FIRST)) {
-            let explains = fit.cost < policy::wrong_mean_square() * target.count() as f64;
+            let explains = fit.cost < policy::WRONG_MEAN_SQUARE * target.count() as f64;
             fits.push(fit);
             if explains {
                 break;
@@ -128,7 +128,7 @@ impl ContactFinder {
 
     /// Whether discs that begin there may be as likely as a fit that is near, of as many contacts or one more.
     pub(super) fn may_be_as_good(&self, start: &Start, near: &DiscFit) -> bool {
-        start.cost < near.cost + policy::lost_squares()
+        start.cost < near.cost + policy::LOST_SQUARES
     }
 
     /// Whether each of some contacts is where one of the others is.

@@ -127,13 +127,13 @@ impl Window<'_> {
         spread_m: f64,
     ) -> Option<(Together, Vec<f64>)> {
         // What has gone far is not explained by contacts that stay.
-        (still.at.cost < policy::wrong_mean_square() * self.count()).then_some(())?;
+        (still.at.cost < policy::WRONG_MEAN_SQUARE * self.count()).then_some(())?;
         let moving = self.explained(of_radii(growing.at.contacts(), from), Motion::Moving(spread_m));
         let rivals = [Some(&growing), moving.as_ref(), Some(&still)].into_iter().flatten();
         let rival = rivals.map(|rival| rival.ln_evidence).fold(f64::NEG_INFINITY, f64::max);
         let mut by_count = vec![f64::NEG_INFINITY; self.finder.settings.most + 1];
         by_count[still.count()] = rival;
-        let needed = |found: &Together| rival + policy::gone_nats() * (found.count() - from.len()) as f64;
+        let needed = |found: &Together| rival + policy::GONE_NATS * (found.count() - from.len()) as f64;
         let (mut best, mut last) = (None, still);
         while last.count() < self.finder.settings.most {
             let more = self.one_more(&last, spread_m).filter(|(more, _)| self.may_be(more));
@@ -217,7 +217,7 @@ impl Window<'_> {
     /// much.
     fn may_be_more(&self, still: &Together, spread_m: f64) -> bool {
         let gain = || self.gain_by_motion(still, Motion::Growing(spread_m));
-        !self.fits(still) || gain().is_some_and(|gain| gain > 2.0 * policy::gone_nats())
+        !self.fits(still) || gain().is_some_and(|gain| gain > 2.0 * policy::GONE_NATS)
     }
 
     /// Readings that count.

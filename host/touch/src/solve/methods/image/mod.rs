@@ -196,7 +196,7 @@ impl Nonlinear {
         let solution = self.shared.solution(&descent, &target);
         let left = self.shared.left(&descent, &target);
         // The warm start has to be given up: what is left is no noise, and much more than a fresh start left.
-        let is_lost = left > self.shared.misfit_limit(&target) && left > policy::image_worse() * descent.begun;
+        let is_lost = left > self.shared.misfit_limit(&target) && left > policy::IMAGE_WORSE * descent.begun;
         // A first frame of a finger that lands may leave much; what later ones leave counts.
         descent.begun = descent.begun.min(left);
         self.last = Some(descent);

@@ -69,7 +69,7 @@ impl NetworkSolver {
     fn contacts(&self, count: usize, image_s_per_m2: &[f32]) -> Vec<FoundContact> {
         let places_m = peaks::places_m(&self.grid, &self.outputs.map, count);
         let conductances_s = self.grid.conductances_s(image_s_per_m2, &places_m);
-        let least_s = policy::network_least_share() * conductances_s.iter().sum::<f64>();
+        let least_s = policy::NETWORK_LEAST_SHARE * conductances_s.iter().sum::<f64>();
         let contact = |([x_m, y_m], conductance_s): (&[f64; 2], f64)| {
             (conductance_s >= least_s).then(|| FoundContact::flat(*x_m, *y_m, conductance_s))
         };

@@ -26,7 +26,7 @@ impl Usual {
             Course::Line(_) => 2.0_f64.ln() - 2.0 * self.area_m2.ln(),
             Course::Ring { radius_m, .. } => (radius_m / self.largest_radius_m()).ln() - self.area_m2.ln(),
         };
-        course + normal(self.width_deviation) + normal(self.conductance_deviation) - policy::shape_nats()
+        course + normal(self.width_deviation) + normal(self.conductance_deviation) - policy::SHAPE_NATS
     }
 
     /// What it takes to say a strip, in squares of deviations; `matrix` is that of the normal equations, and `known` the squares of what is

@@ -86,7 +86,7 @@ impl ShapeFinder {
             width_m: WIDTH * spacing_m,
             width_deviation: WIDTH_DEVIATION,
             conductance_s: detector.sheet_conductance_s(),
-            conductance_deviation: policy::conductance_deviation(),
+            conductance_deviation: policy::CONDUCTANCE_DEVIATION,
             spacing_m,
             bounds_m: geometry::bounds(&mesh.nodes_m),
             area_m2: mesh.node_areas_m2.iter().sum(),
@@ -112,7 +112,7 @@ impl ShapeFinder {
         let coarse = self.fitter(&self.coarse);
         let starts = start::starts(contacts, self.usual.width_m);
         let starts = starts.into_iter().chain(from.map(|fit| *fit.strip()));
-        let most = policy::shape_rivals() * rival;
+        let most = policy::SHAPE_RIVALS * rival;
         let fits = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, COLD_STEPS)));
         let (lines, rings): (Vec<_>, Vec<_>) =
             fits.filter(|fit| fit.evidence().score() < most).partition(|fit| fit.strip().is_line());
@@ -120,7 +120,7 @@ impl ShapeFinder {
         let mut kinds: Vec<_> = [lines, rings].into_iter().filter_map(|fits| fits.into_iter().min_by(lowest)).collect();
         kinds.sort_unstable_by(lowest);
         let best = kinds.first()?.evidence().score();
-        kinds.retain(|other| other.evidence().score() < policy::shape_rivals() * best);
+        kinds.retain(|other| other.evidence().score() < policy::SHAPE_RIVALS * best);
         let fits = kinds.iter().filter_map(|fit| self.catch_up(fit, target));
         fits.filter(|fit| self.is_clear(fit.strip(), 1.0)).min_by(lowest)
     }
@@ -137,17 +137,15 @@ impl ShapeFinder {
 
     /// Whether what was chosen is still more than a disc to the readings.
     fn is_kept(&self, strip: &Strip) -> bool {
-        self.is_clear(strip, policy::kept_shape_share())
+        self.is_clear(strip, policy::KEPT_SHAPE_SHARE)
     }
 
     /// Whether it is more than a disc to the readings, by a share of what a search asks for.
     fn is_clear(&self, strip: &Strip, share: f64) -> bool {
         let spacing_m = self.usual.spacing_m;
         let (size_m, least_m) = match strip.course {
-            Course::Line(_) => {
-                (strip.course.length_m(), (2.0 * strip.width_m).max(policy::shortest_line() * spacing_m))
-            }
-            Course::Ring { radius_m, .. } => (radius_m, (1.5 * strip.width_m).max(policy::smallest_ring() * spacing_m)),
+            Course::Line(_) => (strip.course.length_m(), (2.0 * strip.width_m).max(policy::SHORTEST_LINE * spacing_m)),
+            Course::Ring { radius_m, .. } => (radius_m, (1.5 * strip.width_m).max(policy::SMALLEST_RING * spacing_m)),
         };
         size_m > share * least_m
     }
@@ -156,7 +154,7 @@ impl ShapeFinder {
     pub fn may_be(&self, contacts: &[FoundContact]) -> bool {
         match contacts {
             [] => false,
-            [one] => one.radius_m.is_some_and(|radius_m| radius_m > policy::smallest_ring() * self.usual.spacing_m),
+            [one] => one.radius_m.is_some_and(|radius_m| radius_m > policy::SMALLEST_RING * self.usual.spacing_m),
             _ => true,
         }
     }

@@ -207,7 +207,7 @@ fn a_ring_that_closes_is_let_go_before_it_is_a_disc() {
         tracker.adopt(&fit, &target);
         if let Some(Solution { shape: Some(FoundShape::Ring(found)), .. }) = tracker.solution(&target) {
             assert!(
-                found.radius_m > policy::kept_shape_share() * 1.5 * found.width_m,
+                found.radius_m > policy::KEPT_SHAPE_SHARE * 1.5 * found.width_m,
                 "{found:?} of a ring of {radius_m} m"
             );
         } else {

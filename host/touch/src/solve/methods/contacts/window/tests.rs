@@ -202,7 +202,7 @@ fn motion_gains_what_its_score_says_and_nothing_where_contacts_stay() {
     let still: Vec<f64> = (0..40).map(|seed| score(seed, 0.0).0).collect();
     let mean = still.iter().sum::<f64>() / 40.0;
     let largest = still.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    assert!((-6.0..1.0).contains(&mean) && largest < 2.0 * policy::gone_nats(), "{mean} {largest}");
+    assert!((-6.0..1.0).contains(&mean) && largest < 2.0 * policy::GONE_NATS, "{mean} {largest}");
     let (expected, gained) = score(1, 5e-4);
-    assert!(expected > 2.0 * policy::gone_nats() && (expected / gained - 1.0).abs() < 0.3, "{expected} of {gained}");
+    assert!(expected > 2.0 * policy::GONE_NATS && (expected / gained - 1.0).abs() < 0.3, "{expected} of {gained}");
 }

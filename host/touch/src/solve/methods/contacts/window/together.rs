@@ -179,7 +179,7 @@ impl Window<'_> {
     /// How far mean strength and radius of a contact are from what is usual, in standard deviations.
     fn unusual(&self, fits: &[DiscFit], k: usize) -> [f64; 2] {
         [
-            (mean_of(fits, k, &ln_conductance) - self.fitter.sheet_s.ln()) / policy::conductance_deviation(),
+            (mean_of(fits, k, &ln_conductance) - self.fitter.sheet_s.ln()) / policy::CONDUCTANCE_DEVIATION,
             (mean_of(fits, k, &ln_radius) - self.fitter.usual_radius_m.ln()) / self.fitter.radius_deviation,
         ]
     }
@@ -189,14 +189,14 @@ impl Window<'_> {
         let (units_m, mut parameters, mut deviations) = (fit.units_m(), Vec::new(), Vec::new());
         for (k, unit_m) in units_m.iter().enumerate() {
             parameters.push(PARAMETERS * k + 2);
-            deviations.push(policy::strength_deviation() / (1.0 + fit.constriction(k)));
+            deviations.push(policy::STRENGTH_DEVIATION / (1.0 + fit.constriction(k)));
             if let Some(spread_m) = motion.spread_m() {
                 parameters.extend([PARAMETERS * k, PARAMETERS * k + 1]);
                 deviations.extend([spread_m / unit_m; 2]);
             }
             if let Motion::Growing(_) = motion {
                 parameters.push(PARAMETERS * k + 3);
-                deviations.push(policy::growth_deviation());
+                deviations.push(policy::GROWTH_DEVIATION);
             }
         }
         (parameters, deviations)
@@ -288,7 +288,7 @@ impl Window<'_> {
             let place = fit.along(k).1.powi(2) / self.fitter.place_variance_m2;
             (0..2).for_each(|axis| matrix[(PARAMETERS * k + axis, PARAMETERS * k + axis)] += place);
             let (level, radius) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
-            let by_level = (1.0 + fit.constriction(k)) / policy::conductance_deviation();
+            let by_level = (1.0 + fit.constriction(k)) / policy::CONDUCTANCE_DEVIATION;
             matrix[(level, level)] += by_level * by_level;
             let [strength_off, radius_off] = self.unusual(&at.fits, k);
             gradient[level] -= by_level * strength_off;
@@ -345,7 +345,7 @@ impl Window<'_> {
         let Point { fits, cost, known } = &at;
         let count = fits[0].contacts.len();
         let (_, deviations) = self.own_parameters(&fits[0], motion);
-        let peak = -(policy::conductance_deviation() * TAU.sqrt()).ln() - policy::fewer_nats();
+        let peak = -(policy::CONDUCTANCE_DEVIATION * TAU.sqrt()).ln() - policy::FEWER_NATS;
         let peaks_of_own: f64 = fits
             .iter()
             .map(|fit| self.own_parameters(fit, motion).1.iter().map(|one| -(one * TAU.sqrt()).ln()).sum::<f64>())
