@@ -13,7 +13,7 @@ use crate::lanes::at_once;
 use crate::loaded::{PerElectrode, Spot};
 use crate::normal::Normal;
 use crate::posterior::Factor;
-use crate::products::dot;
+use crate::products::{add, dot};
 use crate::real::Real;
 use crate::scan::{APART, Candidate, Candidates, places, take};
 use crate::solver::Task;
@@ -72,16 +72,20 @@ impl<T: Real> Sums<T> {
         apart.iter_mut().zip(potentials_ohm).for_each(|(apart, ohm)| *apart = *ohm - mean_ohm);
         let apart = &apart[..potentials_ohm.len()];
         let squares = dot(apart, apart);
+        // Sums of rows, of what is left and of what is there, whose products with those differences are those of all rows.
+        let (mut lefts, mut theres) = ([T::ZERO; MAX_ELECTRODES], [T::ZERO; MAX_ELECTRODES]);
         let (mut along, mut square) = (T::ZERO, T::ZERO);
         let rows = held.there_v().chunks_exact(apart.len()).zip(held.left().chunks_exact(apart.len()));
         for ((g, (there_v, left)), own) in rows.enumerate().zip(potentials_ohm) {
             let (per_ohm, down) = (self.per_ohm[g] * *own, apart[g]);
-            along += per_ohm * (dot(left, apart) - down * self.left[g] + *own * self.left_share[g]);
-            let by_share = self.per_v * dot(there_v, apart) - down * self.share[g];
-            let of_own = *own * (T::of(2.0) * by_share + *own * self.share_square[g]);
-            square += per_ohm * per_ohm * (squares + count * down * down + of_own);
+            let weight = per_ohm * per_ohm;
+            add(&mut lefts, per_ohm, left);
+            add(&mut theres, T::of(2.0) * self.per_v * weight * *own, there_v);
+            along += per_ohm * (*own * self.left_share[g] - down * self.left[g]);
+            let of_own = *own * (*own * self.share_square[g] - T::of(2.0) * down * self.share[g]);
+            square += weight * (squares + count * down * down + of_own);
         }
-        (along, square)
+        (along + dot(&lefts[..apart.len()], apart), square + dot(&theres[..apart.len()], apart))
     }
 }
 
@@ -108,23 +112,22 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
         let change = &mut change[..n * n];
         let sums = self.sums();
         let mut list = [Place { cell: (0, 0), gain: T::ZERO }; CLOSELY];
-        for cell in places(table) {
-            if !self.is_free(cell) {
-                continue;
-            }
-            work.looked();
-            let (_, potentials_ohm) = self.potentials_ohm(cell);
-            let (along, square) = at_once(
-                #[inline(always)]
-                || sums.along_and_square(self.held, &potentials_ohm[..n]),
-            );
-            let gain = along * along / square;
-            let last = &mut list[CLOSELY - 1];
-            if along > T::ZERO && gain > last.gain {
-                *last = Place { cell, gain };
-                list.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain));
-            }
-        }
+        at_once(
+            #[inline(always)]
+            || {
+                for cell in places(table).filter(|cell| self.is_free(*cell)) {
+                    work.looked();
+                    let (_, potentials_ohm) = self.potentials_ohm(cell);
+                    let (along, square) = sums.along_and_square(self.held, &potentials_ohm[..n]);
+                    let gain = along * along / square;
+                    if along > T::ZERO && gain > list[CLOSELY - 1].gain {
+                        let at = list.partition_point(|better| better.gain >= gain);
+                        list[at..].rotate_right(1);
+                        list[at] = Place { cell, gain };
+                    }
+                }
+            },
+        );
         for Place { cell: (i, j), .. } in list.into_iter().filter(|place| place.gain > T::ZERO) {
             let own_ohm = self.change((i, j), change);
             let along = dot(change, self.held.left());
@@ -191,6 +194,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
         }
     }
 
+    #[inline(always)]
     fn is_free(&self, (i, j): (usize, usize)) -> bool {
         let (table, radius_m) = (self.task.table, T::of(self.task.table.head().radius_m));
         let at_m: [T; 2] = table.middle_m(i, j);
@@ -203,6 +207,7 @@ impl<T: Real, const K: usize, const D: usize> Births<'_, '_, T, K, D> {
     }
 
     /// The own field of a disc at a place, and potentials there without one, for 1 A into each electrode (ohm).
+    #[inline(always)]
     fn potentials_ohm(&self, (i, j): (usize, usize)) -> (T, PerElectrode<T>) {
         let table = self.task.table;
         let (mut fields_ohm, mut potentials_ohm) = ([T::ZERO; MAX_ELECTRODES], [T::ZERO; MAX_ELECTRODES]);

@@ -274,6 +274,7 @@ impl<T: Real, const K: usize> Circuit<T, K> {
     }
 
     /// Potentials under a place without a contact, for 1 A into each electrode (ohm), from the fields there.
+    #[inline(always)]
     pub fn potentials_ohm(
         &self,
         detector: &Detector<'_, T>,
