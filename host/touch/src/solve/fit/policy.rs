@@ -159,6 +159,8 @@ pub(crate) const SUSPICIOUS_CONTACTS: usize = 3;
 /// apart and lines of 16 to 24 mm on `square-60` as built are explained alike: with 6 nats 7 of 80 such pairs are lines and 59 of 80 lines are found, with 7
 /// one and 40. What is nearly as likely is named.
 pub(crate) const SHAPE_NATS: f64 = 7.0;
+/// Standard errors of how far apart the outermost contacts are by which they have moved since a shape was compared with them: of noise alone, 1 in 400.
+pub(crate) const SPREAD_DEVIATIONS: f64 = 3.0;
 /// A shape of so many times the rival's score on the coarse mesh is given up.
 pub(crate) const SHAPE_RIVALS: f64 = 4.0;
 /// Shortest line, in mean distances of electrodes.

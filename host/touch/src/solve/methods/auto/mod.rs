@@ -16,9 +16,10 @@ use std::sync::Arc;
 use self::first_look::FirstLook;
 use self::search::AutoSearch;
 use self::tracker::AutoTracker;
-use crate::solve::answer::{Solution, SolveError};
+use crate::solve::answer::{FoundContact, Solution, SolveError};
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::fit::evidence::Evidence;
+use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use crate::solve::methods::contacts::{
     ContactFinder, ContactHypothesis, ContactSearch, ContactSettings, ContactTracker,
@@ -28,6 +29,7 @@ use crate::solve::methods::shapes::{ShapeFinder, ShapeTracker, StripFit};
 use crate::solve::problem::Problem;
 use crate::solve::solver::{Parts, Solver, Tracker, follow_and_search, follow_rows_and_search};
 use tactomo_physics::forward::ForwardError;
+use tactomo_physics::geometry;
 use tactomo_physics::readings::Readings;
 
 /// Chooses the model of the scene.
@@ -55,13 +57,36 @@ struct Rival {
     name: &'static str,
     /// Its probability.
     share: f64,
+    /// How many contacts it is in place of, and how far apart the outermost are (m).
+    contacts: usize,
+    across_m: f64,
 }
 
 impl Rival {
-    fn of(shape: &StripFit, contacts: Evidence) -> Self {
+    fn of(shape: &StripFit, evidence: Evidence, contacts: &[FoundContact]) -> Self {
         let name = if shape.strip().is_line() { "line" } else { "ring" };
-        Self { name, share: shape.evidence().share_against(&contacts) }
+        let (across_m, _) = across_m(contacts);
+        Self { name, share: shape.evidence().share_against(&evidence), contacts: contacts.len(), across_m }
     }
+
+    /// Whether these are still the contacts that it was compared with: as many, and as far apart as far as is known. Fingers that spread are no line.
+    fn is_of(&self, contacts: &[FoundContact]) -> bool {
+        let (across_m, error_m) = across_m(contacts);
+        contacts.len() == self.contacts && (across_m - self.across_m).abs() <= policy::SPREAD_DEVIATIONS * error_m
+    }
+}
+
+/// How far apart the outermost of some contacts are, and the standard error of that (m).
+fn across_m(contacts: &[FoundContact]) -> (f64, f64) {
+    let variance_m2 = |contact: &FoundContact| {
+        contact.uncertainty.map_or(f64::INFINITY, |errors| errors.x_m * errors.x_m + errors.y_m * errors.y_m)
+    };
+    let pairs = contacts.iter().enumerate().flat_map(|(k, one)| contacts[..k].iter().map(move |other| (one, other)));
+    let ways = pairs.map(|(one, other)| {
+        let way_m = geometry::distance([one.x_m, one.y_m], [other.x_m, other.y_m]);
+        (way_m, (variance_m2(one) + variance_m2(other)).sqrt())
+    });
+    ways.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
 }
 
 /// What touches as one, rather than as contacts.

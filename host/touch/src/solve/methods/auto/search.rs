@@ -124,7 +124,7 @@ impl AutoSearch {
         let shape = self.shape((solution, contacts), shape_of(from.as_ref()), target);
         let (shape, rival) = match shape {
             Some(shape) if shape.evidence().score() < contacts.score() => (Some(shape), None),
-            other => (None, other.map(|shape| Rival::of(&shape, contacts))),
+            other => (None, other.map(|shape| Rival::of(&shape, contacts, &solution.contacts))),
         };
         let best = shape.as_ref().map_or(contacts, StripFit::evidence);
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));

@@ -101,7 +101,19 @@ impl AutoTracker {
         let search = contacts.follow(target);
         // That more frames of the same are looked at casts no doubt on what is shown.
         let is_doubted = search && !contacts.has_news();
-        Followed { solution: as_contacts(contacts.solution(target), self.rival, is_doubted), search }
+        let solution = contacts.solution(target);
+        Followed { solution: self.as_contacts(solution, is_doubted), search }
+    }
+
+    /// The solution of contacts with the shape that there may be in place of them, until they have come or gone, or moved apart.
+    fn as_contacts(&mut self, mut solution: Solution, search: bool) -> Solution {
+        self.rival = self.rival.filter(|rival| rival.is_of(&solution.contacts));
+        let rival = self.rival.filter(|rival| solution.certainty.is_some() && rival.share >= policy::NAMED_SHARE);
+        let share = 1.0 - rival.map_or(0.0, |rival| rival.share);
+        solution.certainty = solution.certainty.map(|certainty| share * certainty);
+        let of_less = |other: Alternative| Alternative { certainty: share * other.certainty, ..other };
+        solution.alternative = solution.alternative.map(of_less).filter(|other| other.certainty >= policy::NAMED_SHARE);
+        as_contacts(solution, rival, search)
     }
 
     fn follow_shape(&mut self, target: &Target) -> Option<Followed> {
@@ -204,7 +216,10 @@ impl AutoTracker {
         let search = search || self.contacts.as_ref().is_some_and(|contacts| contacts.finder().is_outdated(target));
         let solution = match (whole, &mut self.contacts) {
             (Some((whole, why)), _) => self.with_contacts(whole, Some(target), &why),
-            (None, Some(contacts)) => as_contacts(contacts.solution(target), self.rival, search),
+            (None, Some(contacts)) => {
+                let solution = contacts.solution(target);
+                self.as_contacts(solution, search)
+            }
             (None, None) => nothing(Solution::default(), search),
         };
         self.first_look.of(Followed { solution, search }, readings)
@@ -261,7 +276,8 @@ impl Tracker for AutoTracker {
             (Answer::Contacts, Some(contacts)) => {
                 self.average.reset();
                 let Followed { solution, search } = contacts.follow_rows(rows, elapsed_s)?;
-                self.first_look.of(Followed { solution: as_contacts(solution, self.rival, search), search }, latest)
+                let solution = self.as_contacts(solution, search);
+                self.first_look.of(Followed { solution, search }, latest)
             }
             _ => self.follow(latest),
         }

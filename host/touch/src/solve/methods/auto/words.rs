@@ -2,18 +2,12 @@
 
 use super::Rival;
 use crate::solve::answer::{Alternative, Calibrated, Choice, FoundShape, Solution};
-use crate::solve::fit::policy;
 
 /// The solution of contacts, and what it is; there may be a shape in place of them.
-pub(super) fn as_contacts(mut solution: Solution, rival: Option<Rival>, search: bool) -> Solution {
+pub(super) fn as_contacts(solution: Solution, rival: Option<Rival>, search: bool) -> Solution {
     if solution.contacts.is_empty() {
         return nothing(solution, search);
     }
-    let rival = rival.filter(|rival| solution.certainty.is_some() && rival.share >= policy::NAMED_SHARE);
-    let share = 1.0 - rival.map_or(0.0, |rival| rival.share);
-    solution.certainty = solution.certainty.map(|certainty| share * certainty);
-    let of_less = |other: Alternative| Alternative { certainty: share * other.certainty, ..other };
-    solution.alternative = solution.alternative.map(of_less).filter(|other| other.certainty >= policy::NAMED_SHARE);
     let found = solution.contacts.len();
     let what =
         either(found, solution.alternative) + &rival.map(|rival| format!(" or a {}", rival.name)).unwrap_or_default();
