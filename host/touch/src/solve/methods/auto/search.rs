@@ -39,8 +39,7 @@ impl AutoSearch {
         may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))?
     }
 
-    /// The line or ring that explains a frame of a detector that is not known exactly, where the contacts so far do not: each more
-    /// of them takes longer than to look for it.
+    /// The line or ring that explains a frame where the contacts so far do not: each more of them, by the model itself, takes longer than to look for it.
     fn early(
         &self,
         search: &ContactSearch,
@@ -49,7 +48,7 @@ impl AutoSearch {
         mean: &Mean,
     ) -> Option<StripFit> {
         let finder = self.finder.as_ref()?;
-        let target = finder.target_of(mean, Some(contacts.error()?)).ok()?;
+        let target = finder.target_of(mean, contacts.error()).ok()?;
         // A single contact stands for a line or a ring if it is as wide as may be; else a second one is nearer.
         let may_be = contacts.count() > 1 || finder.is_widest(contacts);
         if !may_be || !finder.evidence_of_found(contacts).is_misfit(target.count()) {

@@ -82,7 +82,11 @@ impl ContactFinder {
             return self.search_by_discs(followed, target, better);
         };
         let Some(best) = self.likelier(followed, alone) else { return ControlFlow::Continue(None) };
-        let best = self.or_one_wide(self.without_needless(best));
+        let best = self.or_one_wide(best);
+        if self.is_misfit(&best.hypothesis.fit, &best.target) {
+            told(&best, better)?;
+        }
+        let best = self.without_needless(best);
         told(&best, better)?;
         let fit = &best.hypothesis.fit;
         // In how wide one is another one may be hidden, far from it.
