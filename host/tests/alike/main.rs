@@ -31,8 +31,8 @@ fn times_behind(scene: SceneName) -> f64 {
     if matches!(scene, SceneName::Texture | SceneName::Hand | SceneName::FiveFingers) { 6.0 } else { 1.0 }
 }
 
-/// Time of the scene from which on answers count (s). What is no few contacts is told once a search is done, beside the simulated board on two cores: 0.65 to
-/// 0.85 s for a ring; time stands still for that offline. A fixed contact is shown within the first 0.2 s.
+/// Time of the scene from which on answers count (s). Contacts are told within the first 0.2 s. What is no few contacts is told once a search is done, for which time
+/// stands still offline: a ring after 0.65 to 0.85 s, beside the simulated board on two cores.
 fn settled_s(method: Method, scene: SceneName) -> f64 {
     let is_searched_for =
         method == Method::Auto && matches!(scene, SceneName::Ring | SceneName::Line | SceneName::Wide);

@@ -2,8 +2,8 @@
 //!
 //! One name for one thing, in standard deviations, in squares of those ("squared deviations", as sums of squares and scores are), in nats
 //! (logarithms of odds or of evidence), or in shares, each with its source or the measurement behind it. Constants of a computation, as steps of a fit
-//! or sizes of a grid, stay with it. Those of electrodes that cannot be right are in `health`. Whoever changes one runs `cargo lab
-//! bank`, on a seed that was not used to choose it.
+//! or sizes of a grid, stay with it. Those of electrodes that cannot be right are in `health`. Whoever changes one runs
+//! `cargo lab bank`, on a seed that was not used to choose it.
 
 // What readings say.
 

@@ -82,12 +82,16 @@ impl ContactFinder {
             return self.search_by_discs(followed, target, better);
         };
         let Some(best) = self.likelier(followed, alone) else { return ControlFlow::Continue(None) };
-        let best = self.or_one_wide(best);
-        if self.is_misfit(&best.hypothesis.fit, &best.target) {
+        let all = self.or_one_wide(best);
+        let is_misfit = self.is_misfit(&all.hypothesis.fit, &all.target);
+        if is_misfit {
+            told(&all, better)?;
+        }
+        let count = all.count();
+        let best = self.without_needless(all);
+        if !is_misfit || best.count() != count {
             told(&best, better)?;
         }
-        let best = self.without_needless(best);
-        told(&best, better)?;
         let fit = &best.hypothesis.fit;
         // In how wide one is another one may be hidden, far from it.
         let may_be_two = best.target.error().is_none() && best.count() == 1 && self.may_be_two(fit).is_some();
