@@ -10,6 +10,9 @@
 //! at `s + U^-1 U'^-1 g`, the posterior's mean: by Woodbury's identity the sum of squares with `v I + P P'` for the covariance. What is subtracted is as small as what is left,
 //! however far the detector is from its description.
 
+mod sums;
+
+use self::sums::Sums;
 use crate::circuit::Circuit;
 use crate::detector::Detector;
 use crate::frame::{Frame, left_v};
@@ -74,6 +77,10 @@ impl<T: Real> Room<'_, T> {
             left,
             read_v,
             turned,
+            of_detector,
+            with_contacts,
+            pull,
+            rows,
         ] = counts(table, unknown, contacts).map(|count| {
             let (part, after) = core::mem::take(&mut rest).split_at_mut(count);
             rest = after;
@@ -99,12 +106,13 @@ impl<T: Real> Room<'_, T> {
             left,
             read_v,
             turned,
+            sums: Sums { of_detector, with_contacts, pull, rows },
         };
         Parts { moved, shares, held }
     }
 }
 
-fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 13] {
+fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 17] {
     let (readings, count) = (table.electrodes() * table.electrodes(), unknown.directions.len());
     let parameters = PARAMETERS * contacts;
     [
@@ -121,6 +129,10 @@ fn counts(table: &Table<'_>, unknown: &Unknown<'_>, contacts: usize) -> [usize; 
         readings,
         readings,
         readings,
+        count * count,
+        parameters * count,
+        count,
+        parameters * count,
     ]
 }
 
@@ -151,6 +163,7 @@ pub(crate) struct Held<'m, T, const D: usize> {
     read_v: &'m mut [T],
     /// Room for readings turned.
     turned: &'m mut [T],
+    sums: Sums<'m, T>,
 }
 
 /// A look in the directions of the patterns.

@@ -11,6 +11,7 @@
 //! - `evidence`: which of two explanations is believed
 //! - `scan`, `beside`, `births`: where a first contact may be, and one more, on a detector that is known or not
 //! - `search`: what explains a frame that what was followed does not
+//! - `together`: what several frames say together of contacts that stay
 //! - [`Solver`]: contacts from frame to frame
 
 #![no_std]
@@ -64,6 +65,7 @@ pub mod spline;
 pub mod table;
 #[cfg(test)]
 mod tests;
+mod together;
 mod told;
 mod unknown;
 #[cfg(test)]
@@ -81,4 +83,5 @@ pub use self::real::Real;
 
 pub use self::solver::{BOARD_CONTACTS, Solver};
 pub use self::table::{MAX_ELECTRODES, Table, TableError};
+pub use self::together::{MOST_TOGETHER, Motion, Together};
 pub use self::unknown::{Change, Direction, Unknown};

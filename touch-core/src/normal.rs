@@ -114,7 +114,26 @@ impl<T: Real, const K: usize> Normal<T, K> {
         radius_deviation: T,
         held: &mut Held<'_, T, D>,
     ) {
-        *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
+        *self = Self::noted(detector, circuit, frame, noise_v, held);
+        held.leave(frame, T::of(detector.table.head().full_v), noise_v);
+        held.project(self.count);
+        self.cost = dot(held.left(), held.left());
+        held.products(self.count, |i, j, product| self.matrix[i][j] = product, |i, product| self.pull[i] = product);
+        let projected = held.projected();
+        self.leave_out(&projected);
+        self.leave_out_squares(&projected);
+        self.add_known(circuit, radius_deviation);
+    }
+
+    /// None yet, of contacts that were read, whose derivatives are noted in what is held.
+    pub fn noted<const D: usize>(
+        detector: &Detector<'_, T>,
+        circuit: &mut Circuit<T, K>,
+        frame: &Frame<'_, T>,
+        noise_v: T,
+        held: &mut Held<'_, T, D>,
+    ) -> Self {
+        let mut all = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         circuit.derive(detector.table);
         let (head, n) = (detector.table.head(), detector.table.electrodes());
         let mut slopes = [[[T::ZERO; MAX_ELECTRODES]; PARAMETERS]; K];
@@ -133,23 +152,16 @@ impl<T: Real, const K: usize> Normal<T, K> {
                 let left = left_v(frame, g * n + e, T::of(head.full_v), held.read_v()[g * n + e]);
                 *scale = left.map_or(T::ZERO, |_| *scale / noise_v);
             }
-            for (i, row) in slopes.as_flattened_mut().iter_mut().enumerate().take(self.count) {
+            for (i, row) in slopes.as_flattened_mut().iter_mut().enumerate().take(all.count) {
                 row.iter_mut().zip(&scales).for_each(|(slope, scale)| *slope *= *scale);
                 held.note(g, i, &row[..n]);
                 if i % PARAMETERS == STRENGTH {
                     let speaks = |e: &usize| frame.says_at(g * n + *e) != Says::AtMost;
-                    self.said[i / PARAMETERS] += (0..n).filter(speaks).map(|e| row[e] * row[e]).sum::<T>();
+                    all.said[i / PARAMETERS] += (0..n).filter(speaks).map(|e| row[e] * row[e]).sum::<T>();
                 }
             }
         }
-        held.leave(frame, T::of(head.full_v), noise_v);
-        held.project(self.count);
-        self.cost = dot(held.left(), held.left());
-        held.products(self.count, |i, j, product| self.matrix[i][j] = product, |i, product| self.pull[i] = product);
-        let projected = held.projected();
-        self.leave_out(&projected);
-        self.leave_out_squares(&projected);
-        self.add_known(circuit, radius_deviation);
+        all
     }
 
     /// The same of what is left now, by the derivatives and patterns that are kept: those of contacts nearby.
@@ -173,7 +185,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
     }
 
     /// Takes what steps of the detector could do as well from the sums with what is left.
-    fn leave_out(&mut self, projected: &Projected<'_, T>) {
+    pub fn leave_out(&mut self, projected: &Projected<'_, T>) {
         self.cost += projected.less();
         let Projected { left, columns, solved, .. } = projected;
         let count = left.len();
@@ -184,7 +196,7 @@ impl<T: Real, const K: usize> Normal<T, K> {
     }
 
     /// The same from those of the derivatives.
-    fn leave_out_squares(&mut self, Projected { left, columns, .. }: &Projected<'_, T>) {
+    pub fn leave_out_squares(&mut self, Projected { left, columns, .. }: &Projected<'_, T>) {
         let count = left.len();
         let column = |i: usize| &columns[i * count..(i + 1) * count];
         for i in 0..self.count {
@@ -257,6 +269,19 @@ impl<T: Real, const K: usize> Normal<T, K> {
         factor.solve(&mut step);
         let gain = (0..self.count).map(|i| step[i] * self.pull[i]).sum();
         Some((step, gain))
+    }
+
+    /// Keeps the parameters of which something is known, a weight each, which are so far from that; the others stay where they are.
+    pub fn keep(&mut self, known: &Vector<T, K>, ways: &Vector<T, K>) {
+        for i in 0..self.count {
+            if known[i] > T::ZERO {
+                self.matrix[i][i] += known[i];
+                self.pull[i] -= known[i] * ways[i];
+            } else {
+                self.hold(i);
+                self.matrix[i][i] = T::ONE;
+            }
+        }
     }
 
     /// Holds a parameter where it is.

@@ -99,7 +99,7 @@ impl<T: Real, const K: usize> Factor<T, K> {
         right.iter().take(self.count).map(|value| *value * *value).sum()
     }
 
-    fn forward(&self, right: &mut Vector<T, K>) {
+    pub fn forward(&self, right: &mut Vector<T, K>) {
         for i in 0..self.count {
             let sum: T = (0..i).map(|j| self.rows[i][j] * right[j]).sum();
             right[i] = (right[i] * self.scale[i] - sum) / self.rows[i][i];
@@ -107,7 +107,7 @@ impl<T: Real, const K: usize> Factor<T, K> {
     }
 
     /// Logarithm of the determinant of the matrix.
-    fn ln_determinant(&self) -> T {
+    pub fn ln_determinant(&self) -> T {
         T::of(2.0) * (0..self.count).map(|i| (self.rows[i][i] / self.scale[i]).ln()).sum::<T>()
     }
 

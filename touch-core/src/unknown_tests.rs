@@ -21,11 +21,11 @@ use crate::{Answer, Room};
 
 const N: usize = 16;
 /// Directions: two with fields, of which the first has a square, and one of each other kind.
-const DIRECTIONS: usize = 8;
+pub(crate) const DIRECTIONS: usize = 8;
 const TABLES: usize = 3;
 
 /// What is not known of the made-up sheet.
-struct MadeUp {
+pub(crate) struct MadeUp {
     directions: Vec<Direction>,
     changes: Vec<Change>,
     fields_ohm: Vec<f32>,
@@ -35,7 +35,7 @@ struct MadeUp {
 }
 
 impl MadeUp {
-    fn new(table: &Table<'_>) -> Self {
+    pub(crate) fn new(table: &Table<'_>) -> Self {
         let pads_m = grid_m(4, 4);
         let mut fields = Vec::new();
         for j in 0..CELLS + 3 {
@@ -88,7 +88,7 @@ impl MadeUp {
         }
     }
 
-    fn unknown(&self) -> Unknown<'_> {
+    pub(crate) fn unknown(&self) -> Unknown<'_> {
         Unknown {
             directions: &self.directions,
             changes: &self.changes,
@@ -119,7 +119,7 @@ fn on_moved<R>(
 }
 
 /// Readings of contacts on the detector after some steps (V).
-fn read_v(table: &Table<'_>, made_up: &MadeUp, steps: [f64; DIRECTIONS], spots: &[Spot<f64>]) -> Vec<f64> {
+pub(crate) fn read_v(table: &Table<'_>, made_up: &MadeUp, steps: [f64; DIRECTIONS], spots: &[Spot<f64>]) -> Vec<f64> {
     on_moved(table, made_up, steps, |detector, _| {
         let mut circuit = Circuit::<f64, 3>::EMPTY;
         assert!(circuit.solve(detector, spots));

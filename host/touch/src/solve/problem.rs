@@ -184,6 +184,14 @@ impl Problem {
         fields?.measured(self.modelled()).ok()
     }
 
+    /// Whether there is one, or the first call makes one.
+    pub(crate) fn has_compiled(&self) -> bool {
+        match self.nuisance.fields.get() {
+            Some(fields) => fields.is_some(),
+            None => !self.is_made_beside() && self.nuisance.seen_of.is_none(),
+        }
+    }
+
     fn made_fields(&self, cores: usize) -> Option<&CompiledFields> {
         let is_whole = self.nuisance.seen_of.is_none();
         let made = || is_whole.then(|| CompiledFields::of(self.modelled(), cores).ok()).flatten();

@@ -177,11 +177,6 @@ impl ApproximationError {
         &self.leakage_v
     }
 
-    /// Its mean alone.
-    pub fn mean_alone(&self) -> Self {
-        Self { directions: Directions::default(), ..self.clone() }
-    }
-
     /// Of a mean (V) alone.
     pub fn of_mean(mean_v: Vec<f64>) -> Self {
         Self { mean_v, ..Self::default() }

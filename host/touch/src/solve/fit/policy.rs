@@ -107,8 +107,6 @@ pub(crate) const MORE_CONTACTS_NAT: f64 = 1.0 / 3.0;
 pub(crate) const UNTRIED_SHARE: f64 = 0.03;
 /// Standard deviation of the logarithm of a contact's conductance about its mean in frames that are explained together: a factor of e.
 pub(crate) const STRENGTH_DEVIATION: f64 = 1.0;
-/// The same of its radius, where it may grow: a ball's does with the cube root of the force (Hertz, 1882).
-pub(crate) const GROWTH_DEVIATION: f64 = 1.0 / 3.0;
 /// Radius, in usual ones, above which a contact may be two: without it hands of five are four for longer. And the distance, in sums of their radii,
 /// below which two may be one: with 1, two of 80 scenes more are wrong.
 pub(crate) const TWO_RADII: f64 = 1.6;
@@ -137,7 +135,7 @@ pub(crate) const LEAKAGE_SHARE: f64 = 0.5;
 
 // When a contact goes.
 
-/// Nats by which frames of late have to speak for no contact before it is let go, or for one more that stays. A filter of rows that is as far behind
+/// Nats by which frames of late have to speak for no contact before it is let go, or for more that stay. A filter of rows that is as far behind
 /// the best goes on from that: noise alone does that to the right one in 1 of 400 000.
 pub(crate) const GONE_NATS: f64 = 12.0;
 /// Conductance (sheet conductances) below which a contact cannot be distinguished from nothing: a hundredth of the lightest that is found well.

@@ -252,11 +252,6 @@ impl Target {
         Self { weights, fixed_v, shares: self.error.shares(before_v / smaller), ..self.clone() }
     }
 
-    /// The target without what the readings may be off by together, but for the mean of that.
-    pub(crate) fn without_unknowns(&self) -> Self {
-        self.with(self.error.mean_alone())
-    }
-
     /// The target as if the detector were as described; `None` if it is taken as that already.
     pub(crate) fn as_exact(&self, errors: &Errors) -> Option<Self> {
         self.is_informed.then(|| Self::of_mean(&self.readings(), self.frames, errors, None))

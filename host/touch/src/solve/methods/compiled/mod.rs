@@ -6,7 +6,8 @@
 mod tests;
 
 use tactomo_touch_core::{
-    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Room, Says as CoreSays, Solver as Core, Table, Unknown,
+    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Motion, Room, Says as CoreSays, Solver as Core, Table,
+    Together as CoreTogether, Unknown,
 };
 
 use crate::solve::answer::{Alternative, Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};
@@ -32,6 +33,48 @@ pub struct Compiled {
     /// Where the core works on what is not known.
     numbers: Vec<f64>,
     floats: Vec<f32>,
+}
+
+/// A frame of several, with the standard deviation of its noise (V).
+pub(crate) struct NoisyFrame<'f> {
+    pub readings: &'f Readings,
+    pub noise_v: f64,
+}
+
+/// What explains several frames: contacts in each, which [stay or move](Motion), and the detector that they make likely.
+#[derive(Clone)]
+pub(crate) struct Together(Box<CoreTogether<f64, MOST_CONTACTS, MOST_DIRECTIONS>>);
+
+impl Together {
+    /// How many contacts.
+    pub fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    /// Those of a frame.
+    pub fn contacts(&self, frame: usize) -> Vec<Disc> {
+        self.0.contacts(frame).iter().map(disc).collect()
+    }
+
+    /// The detector: in each direction in which it may differ, in standard deviations.
+    pub fn steps(&self) -> &[f64] {
+        self.0.steps()
+    }
+
+    /// Logarithm of the evidence, but for what is the same for all explanations of the same frames.
+    pub fn ln_evidence(&self) -> f64 {
+        self.0.ln_evidence()
+    }
+
+    /// Whether no more is left of the readings than noise leaves.
+    pub fn fits(&self) -> bool {
+        self.0.fits()
+    }
+
+    /// Covariance of what frames have in common: of each contact its place along x and y in usual radii, the logarithm of its resistance, that of its radius.
+    pub fn covariance(&self, i: usize, j: usize) -> f64 {
+        self.0.covariance(i, j)
+    }
 }
 
 /// What explains a frame by itself: contacts, and the detector that they make likely.
@@ -76,12 +119,47 @@ impl Compiled {
             core.limit(most);
             core.solve_unknown(table, unknown, room, frame)
         })?;
-        let disc = |of: &Contact<f64>| Disc::flat(of.x_m, of.y_m, of.radius_m, of.conductance_s);
         Ok(FoundAlone {
             contacts: answer.contacts().iter().map(disc).collect(),
             steps: self.core.steps().to_vec(),
             certainty: answer.certainty.map(|certainty| (certainty.share, alternative(&answer))),
         })
+    }
+
+    /// The explanation of some frames by contacts that begin where they are in each, the same in the same order; `None` if they make no sense.
+    pub(crate) fn together(
+        &mut self,
+        frames: &[NoisyFrame<'_>],
+        contacts: &[Vec<Disc>],
+        motion: Motion<f64, MOST_CONTACTS>,
+    ) -> Option<Together> {
+        let contacts: Vec<Vec<_>> = contacts.iter().map(|all| all.iter().map(core_contact).collect()).collect();
+        let contacts: Vec<_> = contacts.iter().map(Vec::as_slice).collect();
+        self.on_frames(frames, |core, table, unknown, room, frames| {
+            core.together(table, unknown, room, frames, &contacts, motion).map(|found| Together(Box::new(found)))
+        })
+    }
+
+    /// The likeliest explanation with one contact more than another that stay.
+    pub(crate) fn one_more_together(&mut self, frames: &[NoisyFrame<'_>], from: &Together) -> Option<Together> {
+        self.on_frames(frames, |core, table, unknown, room, frames| {
+            core.one_more_together(table, unknown, room, frames, &from.0).map(|found| Together(Box::new(found)))
+        })
+    }
+
+    /// Lets the core work on some frames.
+    fn on_frames<R>(
+        &mut self,
+        frames: &[NoisyFrame<'_>],
+        work: impl FnOnce(&mut HostCore, &Table<'_>, &Unknown<'_>, &mut Room<'_, f64>, &[Frame<'_, f64>]) -> Option<R>,
+    ) -> Option<R> {
+        let CompiledDetector { bytes, drive_v, changes, .. } = &self.detector;
+        let read: Vec<_> = frames.iter().map(|frame| read(frame.readings, *drive_v)).collect();
+        let frames = read.iter().zip(frames);
+        let frames: Vec<_> = frames.map(|((volts, says), of)| Frame::new(volts, says).with_noise(of.noise_v)).collect();
+        let table = Table::read_again(bytes).ok()?;
+        let mut room = Room { numbers: &mut self.numbers, floats: &mut self.floats };
+        work(&mut self.core, &table, &changes.unknown(), &mut room, &frames)
     }
 
     fn answer(&mut self, readings: &Readings, noise_v: Option<f64>) -> Result<Answer<f64, MOST_CONTACTS>, SolveError> {
@@ -105,8 +183,7 @@ impl Compiled {
     ) -> Result<R, SolveError> {
         let CompiledDetector { bytes, electrodes, drive_v, changes, .. } = &self.detector;
         check_count(readings, *electrodes)?;
-        let volts: Vec<_> = readings.volts().iter().map(|volts| held_v(*volts, *drive_v)).collect();
-        let says: Vec<_> = readings.all_say().iter().map(|says| core_says(*says)).collect();
+        let (volts, says) = read(readings, *drive_v);
         let wrong = SolveError::Electrodes { found: readings.electrodes(), expected: *electrodes };
         // It was read, and checked, when it was compiled.
         let table = Table::read_again(bytes).map_err(|_| wrong.clone())?;
@@ -155,6 +232,12 @@ pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
     compiled(problem.modelled(), problem.nuisance())
 }
 
+/// Readings as the core takes them: volts, and what they say.
+fn read(readings: &Readings, drive_v: f64) -> (Vec<f64>, Vec<CoreSays>) {
+    let volts = readings.volts().iter().map(|volts| held_v(*volts, drive_v)).collect();
+    (volts, readings.all_say().iter().map(|says| core_says(*says)).collect())
+}
+
 /// A reading as a board can give it (V): none is far beyond its drive.
 fn held_v(volts: f64, drive_v: f64) -> f64 {
     let most_v = 2.0 * drive_v;
@@ -169,6 +252,10 @@ pub fn add_newtons(table: &[u8], law: &ForceLaw, contacts: &mut [FoundContact]) 
         let apparent_s = contact.apparent_conductance_s.unwrap_or(contact.conductance_s) as f32;
         contact.set_force(law.force_n(table.constricted_conductance_s(at_m, apparent_s).into(), 0.0));
     }
+}
+
+fn disc(contact: &Contact<f64>) -> Disc {
+    Disc::flat(contact.x_m, contact.y_m, contact.radius_m, contact.conductance_s)
 }
 
 fn core_contact(disc: &Disc) -> Contact<f64> {

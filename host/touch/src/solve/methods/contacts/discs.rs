@@ -374,16 +374,6 @@ impl DiscFitter<'_> {
     }
 }
 
-/// What of a step of contacts' parameters may be taken so that no contact's is too long.
-pub(super) fn share_of(step: &[f64]) -> f64 {
-    let (steps, _) = step.as_chunks::<PARAMETERS>();
-    let of = |[first, second, by_s, by_m]: &[f64; PARAMETERS]| {
-        let of_way = LONGEST_WAY / first.hypot(*second);
-        of_way.min(LONGEST_CONDUCTANCE / by_s.abs()).min(LONGEST_RADIUS / by_m.abs())
-    };
-    steps.iter().map(of).fold(1.0, f64::min)
-}
-
 /// Derivatives of the logarithm of a conductance by the last two parameters.
 pub(super) fn by_parameters(constriction: f64) -> [f64; 2] {
     [1.0 + constriction, -constriction]

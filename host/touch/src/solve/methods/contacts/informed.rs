@@ -129,29 +129,38 @@ impl ContactFinder {
 
     /// What the compiled detector finds in a frame from contacts and from nothing, if anything; `None` if there is no table, or not yet, or what is found makes no sense to the model itself.
     fn found_by_table(&self, target: &Target, begun: &[Contact]) -> Option<Option<Informed>> {
-        let found = {
-            let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
-            if compiled.is_none() {
-                *compiled = self.problem.compiled().map(Compiled::on);
-            }
-            compiled.as_mut()?.alone(&target.readings(), target.noise_v, self.settings.most, begun).ok()?
-        };
+        let most = self.settings.most;
+        let found = self.by_table(|compiled| compiled.alone(&target.readings(), target.noise_v, most, begun).ok())?;
         if found.contacts.is_empty() {
             return Some(None);
         }
         self.informed_of(found, target).map(Some)
     }
 
-    /// What a table tells, by what the readings may be off by together near the detector that it makes likely.
-    fn informed_of(&self, found: FoundAlone, target: &Target) -> Option<Informed> {
+    /// What the compiled detector finds; `None` if there is none, or not yet, or it finds nothing.
+    pub(super) fn by_table<R>(&self, find: impl FnOnce(&mut Compiled) -> Option<R>) -> Option<R> {
+        let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
+        if compiled.is_none() {
+            *compiled = self.problem.compiled().map(Compiled::on);
+        }
+        find(compiled.as_mut()?)
+    }
+
+    /// About the detector after steps, in all directions in which it may differ; `None` if there is none such.
+    pub(super) fn about_steps(&self, steps: &[f64]) -> Option<About> {
         let near = match self.problem.nuisance() {
             Some(nuisance) => {
-                let steps = found.steps[..nuisance.directions()].to_vec();
+                let steps = steps[..nuisance.directions()].to_vec();
                 Some(Arc::new(Linearised { detector: nuisance.similar(&steps).ok()?, steps }))
             }
             None => None,
         };
-        let about = About { near, ..About::default() };
+        Some(About { near, ..About::default() })
+    }
+
+    /// What a table tells, by what the readings may be off by together near the detector that it makes likely.
+    fn informed_of(&self, found: FoundAlone, target: &Target) -> Option<Informed> {
+        let about = self.about_steps(&found.steps)?;
         let target = self.informed(target, &found.contacts, &about)?;
         let fit = self.disc_fitter().fit(found.contacts, &target, COLD)?;
         let certainty = found.certainty.map(|(share, alternative)| Certainty { share, alternative });

@@ -143,19 +143,10 @@ impl Scan {
 
     /// The best places for one contact, each apart from better ones.
     pub fn ones(&self, looks: &Looks<'_>, count: usize, apart_m: f64) -> Vec<Candidate> {
-        self.staying(std::slice::from_ref(looks), count, apart_m)
-    }
-
-    /// The best places for one contact that stays in several frames, each apart from better ones. Its conductance is each frame's own, and here their mean.
-    pub fn staying(&self, looks: &[Looks<'_>], count: usize, apart_m: f64) -> Vec<Candidate> {
         let all = (0..self.spots.len()).filter_map(|place| {
-            let of = |looks: &Looks<'_>| {
-                let along = dot(looks.patterns.column(place).as_slice(), looks.left.as_slice()).max(0.0);
-                let conductance_s = along / looks.squares[place];
-                [conductance_s, looks.gain * along * conductance_s]
-            };
-            let sums = looks.iter().map(of).fold([0.0; 2], |sums, one| [sums[0] + one[0], sums[1] + one[1]]);
-            let [conductance_s, gain] = [sums[0] / looks.len() as f64, sums[1]];
+            let along = dot(looks.patterns.column(place).as_slice(), looks.left.as_slice()).max(0.0);
+            let conductance_s = along / looks.squares[place];
+            let gain = looks.gain * along * conductance_s;
             (gain > 0.0).then(|| Candidate { contacts: vec![(place, conductance_s)], gain })
         });
         self.best(all.collect(), count, apart_m)

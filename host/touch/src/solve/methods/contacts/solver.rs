@@ -222,8 +222,10 @@ impl ContactTracker {
             || self.finder.is_outdated(target);
         self.keys.take(target, &found.fit, &self.finder);
         // What is unknown of the detector is soon known, and asks for a search of its own.
-        self.is_of_key_frames =
-            self.keys.are_ripe() && !target.is_provisional() && !self.finder.is_misfit(&found.fit, target);
+        self.is_of_key_frames = self.keys.are_ripe()
+            && !target.is_provisional()
+            && self.finder.problem.has_compiled()
+            && !self.finder.is_misfit(&found.fit, target);
         (self.last, self.whole) = (Some(found), target.error().map(|_| target.clone()));
         search || self.is_of_key_frames
     }

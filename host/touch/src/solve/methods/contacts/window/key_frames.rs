@@ -11,15 +11,18 @@ use crate::solve::fit::target::{Errors, Target};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::scene::Contact;
 use tactomo_physics::space;
+use tactomo_touch_core::MOST_TOGETHER;
 
 /// Frames that a key frame is the mean of: a tenth of a second of the paper's board. Fewer, but not less than these, where readings change by more
 /// than a share of themselves: over a tenth, what their mean has beside the readings of mean strengths is a two-thousandth.
 const AVERAGED: usize = 25;
 const AVERAGED_AT_LEAST: usize = 5;
 const CHANGED: f64 = 0.1;
-/// Key frames that are kept, and fewest that are explained together; so many new ones are waited for before they are again.
-const KEPT: usize = 8;
+/// Key frames that are kept, and fewest that are explained together.
+const KEPT: usize = MOST_TOGETHER;
 const FEWEST: usize = 4;
+/// New ones that are waited for before they are explained again, at first and at most: one more each time that says nothing new.
+const WAITED_FOR: [usize; 2] = [3, 16];
 
 /// The mean of some frames, with the contacts as they were followed at its end.
 #[derive(Clone, Debug)]
@@ -47,12 +50,13 @@ impl KeyFrame {
     }
 }
 
-/// The newest key frames of as many contacts as are followed.
-#[derive(Clone, Debug, Default)]
+/// Key frames of what is followed.
+#[derive(Clone, Debug)]
 pub(in super::super) struct KeyFrames {
     kept: VecDeque<KeyFrame>,
-    /// How many came since they were looked at.
+    /// How many came since they were looked at, and how many are waited for.
     new: usize,
+    waited_for: usize,
     /// The first of the frames since the last one (V), their sum, what they say, and their number.
     first_v: Vec<f64>,
     sum_v: Vec<f64>,
@@ -60,12 +64,28 @@ pub(in super::super) struct KeyFrames {
     frames: usize,
 }
 
+impl Default for KeyFrames {
+    fn default() -> Self {
+        Self {
+            kept: VecDeque::new(),
+            new: 0,
+            waited_for: WAITED_FOR[0],
+            first_v: Vec::new(),
+            sum_v: Vec::new(),
+            says: Vec::new(),
+            frames: 0,
+        }
+    }
+}
+
 impl KeyFrames {
     /// Takes the next frame with what is followed.
     pub fn take(&mut self, target: &Target, fit: &DiscFit, finder: &ContactFinder) {
         let errors = &finder.errors;
         if self.kept.back().is_some_and(|last| last.contacts.len() != fit.contacts.len()) {
-            *self = Self::default();
+            // What touches is the same; how many contacts it is said to be is not.
+            self.kept.iter_mut().for_each(|key| key.contacts.clone_from(&fit.contacts));
+            self.waited_for = WAITED_FOR[0];
         }
         let readings = target.readings();
         if self.frames > 0 && self.have_changed(&readings, errors.noise_v) {
@@ -96,7 +116,7 @@ impl KeyFrames {
             return;
         }
         if self.kept.len() == KEPT {
-            self.kept.pop_front();
+            self.drop_one();
         }
         // A search may have found the same contacts in another order.
         let contacts = self.kept.back().map_or_else(|| fit.contacts.clone(), |last| last.in_order(&fit.contacts));
@@ -106,6 +126,17 @@ impl KeyFrames {
         }
         self.kept.push_back(KeyFrame { mean, contacts });
         self.new += 1;
+    }
+
+    /// Drops the one whose neighbours differ least: those that are left differ as much as they can, however long contacts stay. The newest eight of a hand whose weight goes
+    /// round in four seconds are of 0.8 s, in which strengths change too little to tell a fifth finger.
+    fn drop_one(&mut self) {
+        let apart_v2 = |k: &usize| {
+            let [one, other] = [k - 1, k + 1].map(|of| self.kept[of].mean.readings.volts());
+            one.iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum::<f64>()
+        };
+        let least = (1..self.kept.len() - 1).min_by(|a, b| apart_v2(a).total_cmp(&apart_v2(b)));
+        least.and_then(|k| self.kept.remove(k));
     }
 
     fn add(&mut self, readings: &Readings) {
@@ -133,12 +164,13 @@ impl KeyFrames {
 
     /// Whether they are worth a look.
     pub fn are_ripe(&self) -> bool {
-        self.kept.len() >= FEWEST && self.new >= FEWEST
+        self.kept.len() >= FEWEST && self.new >= self.waited_for
     }
 
     /// They were looked at.
     pub fn looked_at(&mut self) {
         self.new = 0;
+        self.waited_for = (self.waited_for + 1).min(WAITED_FOR[1]);
     }
 
     /// All of them.
