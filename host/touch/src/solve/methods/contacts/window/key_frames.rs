@@ -18,6 +18,9 @@ use tactomo_touch_core::MOST_TOGETHER;
 const AVERAGED: usize = 25;
 const AVERAGED_AT_LEAST: usize = 5;
 const CHANGED: f64 = 0.1;
+/// How far a contact may go while frames are averaged (usual radii): one that slides is in their mean as what is no disc, which two that stay explain better than one that
+/// moves.
+const SLID: f64 = 0.4;
 /// Key frames that are kept, and fewest that are explained together.
 const KEPT: usize = MOST_TOGETHER;
 const FEWEST: usize = 4;
@@ -57,7 +60,8 @@ pub(in super::super) struct KeyFrames {
     /// How many came since they were looked at, and how many are waited for.
     new: usize,
     waited_for: usize,
-    /// The first of the frames since the last one (V), their sum, what they say, and their number.
+    /// The first of the frames since the last one, as contacts are followed in it and what is read (V), their sum, what they say, and their number.
+    first: Vec<Contact>,
     first_v: Vec<f64>,
     sum_v: Vec<f64>,
     says: Vec<Says>,
@@ -70,6 +74,7 @@ impl Default for KeyFrames {
             kept: VecDeque::new(),
             new: 0,
             waited_for: WAITED_FOR[0],
+            first: Vec::new(),
             first_v: Vec::new(),
             sum_v: Vec::new(),
             says: Vec::new(),
@@ -91,6 +96,9 @@ impl KeyFrames {
         if self.frames > 0 && self.have_changed(&readings, errors.noise_v) {
             self.end(fit, finder);
         }
+        if self.frames == 0 {
+            self.first.clone_from(&fit.contacts);
+        }
         self.add(&readings);
         if self.frames == AVERAGED {
             self.end(fit, finder);
@@ -105,10 +113,17 @@ impl KeyFrames {
         change_v2 - 2.0 * self.first_v.len() as f64 * noise_v * noise_v > CHANGED * CHANGED * all_v2
     }
 
+    /// Whether one of the contacts has gone so far (m) since the last key frame.
+    fn have_slid(&self, fit: &DiscFit, far_m: f64) -> bool {
+        let mut pairs = self.first.iter().zip(&fit.contacts);
+        let are_same = self.first.len() == fit.contacts.len();
+        are_same && pairs.any(|(before, now)| space::distance(place_m(before), place_m(now)) > far_m)
+    }
+
     /// Makes a key frame of the frames since the last one, if they are enough and differ from it.
     fn end(&mut self, fit: &DiscFit, finder: &ContactFinder) {
         let frames = std::mem::take(&mut self.frames);
-        if frames < AVERAGED_AT_LEAST {
+        if frames < AVERAGED_AT_LEAST || self.have_slid(fit, SLID * finder.settings.radius_m) {
             return;
         }
         let mean = self.mean(frames);
