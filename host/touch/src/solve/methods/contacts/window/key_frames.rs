@@ -18,8 +18,8 @@ use tactomo_touch_core::MOST_TOGETHER;
 const AVERAGED: usize = 25;
 const AVERAGED_AT_LEAST: usize = 5;
 const CHANGED: f64 = 0.1;
-/// How far a contact may go while frames are averaged (usual radii): one that slides is in their mean as what is no disc, which two that stay explain better than one that
-/// moves.
+/// How far a contact that was told to stay may go while frames are averaged (usual radii): one that slides is in their mean as what is no disc, which two that stay explain
+/// better than one that moves.
 const SLID: f64 = 0.4;
 /// Key frames that are kept, and fewest that are explained together.
 const KEPT: usize = MOST_TOGETHER;
@@ -113,10 +113,10 @@ impl KeyFrames {
         change_v2 - 2.0 * self.first_v.len() as f64 * noise_v * noise_v > CHANGED * CHANGED * all_v2
     }
 
-    /// Whether one of the contacts has gone so far (m) since the last key frame.
+    /// Whether one of the contacts, that were told to stay, has gone so far (m) since the last key frame. Others go far where one stands for two.
     fn have_slid(&self, fit: &DiscFit, far_m: f64) -> bool {
         let mut pairs = self.first.iter().zip(&fit.contacts);
-        let are_same = self.first.len() == fit.contacts.len();
+        let are_same = fit.still.is_some() && self.first.len() == fit.contacts.len();
         are_same && pairs.any(|(before, now)| space::distance(place_m(before), place_m(now)) > far_m)
     }
 
