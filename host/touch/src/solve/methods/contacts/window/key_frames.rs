@@ -24,6 +24,8 @@ const SLID: f64 = 0.4;
 /// Key frames that are kept, and fewest that are explained together.
 const KEPT: usize = MOST_TOGETHER;
 const FEWEST: usize = 4;
+/// A key frame is let go when so many have come after it: what touched then may be gone. At 250 frames a second they are of four seconds.
+const LASTING: usize = 40;
 /// New ones that are waited for before they are explained again, at first and at most: one more each time that says nothing new.
 const WAITED_FOR: [usize; 2] = [3, 16];
 
@@ -32,6 +34,8 @@ const WAITED_FOR: [usize; 2] = [3, 16];
 pub(in super::super) struct KeyFrame {
     pub mean: Mean,
     pub contacts: Vec<Contact>,
+    /// Its number.
+    number: usize,
 }
 
 impl KeyFrame {
@@ -57,7 +61,8 @@ impl KeyFrame {
 #[derive(Clone, Debug)]
 pub(in super::super) struct KeyFrames {
     kept: VecDeque<KeyFrame>,
-    /// How many came since they were looked at, and how many are waited for.
+    /// How many came, how many of them since they were looked at, and how many are waited for.
+    came: usize,
     new: usize,
     waited_for: usize,
     /// The first of the frames since the last one, as contacts are followed in it and what is read (V), their sum, what they say, and their number.
@@ -72,6 +77,7 @@ impl Default for KeyFrames {
     fn default() -> Self {
         Self {
             kept: VecDeque::new(),
+            came: 0,
             new: 0,
             waited_for: WAITED_FOR[0],
             first: Vec::new(),
@@ -135,15 +141,18 @@ impl KeyFrames {
         }
         // A search may have found the same contacts in another order.
         let contacts = self.kept.back().map_or_else(|| fit.contacts.clone(), |last| last.in_order(&fit.contacts));
+        (self.came, self.new) = (self.came + 1, self.new + 1);
         // What has gone that far is not explained by contacts that stay.
-        while self.kept.front().is_some_and(|oldest| !oldest.is_near(&contacts, finder.side_by_side_m())) {
+        let is_over = |oldest: &KeyFrame| {
+            oldest.number + LASTING < self.came || !oldest.is_near(&contacts, finder.side_by_side_m())
+        };
+        while self.kept.front().is_some_and(is_over) {
             self.kept.pop_front();
         }
-        self.kept.push_back(KeyFrame { mean, contacts });
-        self.new += 1;
+        self.kept.push_back(KeyFrame { mean, contacts, number: self.came });
     }
 
-    /// Drops the one whose neighbours differ least: those that are left differ as much as they can, however long contacts stay. The newest eight of a hand whose weight goes
+    /// Drops the one whose neighbours differ least: those that are left differ as much as they can. The newest eight of a hand whose weight goes
     /// round in four seconds are of 0.8 s, in which strengths change too little to tell a fifth finger.
     fn drop_one(&mut self) {
         let apart_v2 = |k: &usize| {
