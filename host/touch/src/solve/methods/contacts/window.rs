@@ -134,14 +134,15 @@ impl Window<'_> {
         let rival = rivals.map(Together::ln_evidence).fold(f64::NEG_INFINITY, f64::max);
         let mut by_count = vec![f64::NEG_INFINITY; most + 1];
         by_count[count] = rival;
-        let (mut best, mut last) = (None, still);
+        let (mut best, mut likeliest, mut last) = (None, rival, still);
         while last.count() < most {
             let Some(more) = compiled.one_more_together(&frames, &last) else { break };
             by_count[more.count()] = more.ln_evidence();
-            let is_worse = more.ln_evidence() < last.ln_evidence();
-            if !is_worse && more.ln_evidence() > rival + policy::GONE_NATS {
+            if more.ln_evidence() > likeliest + policy::GONE_NATS {
+                likeliest = more.ln_evidence();
                 best = Some(more.clone());
             }
+            let is_worse = more.ln_evidence() < last.ln_evidence();
             last = more;
             if is_worse {
                 break;
