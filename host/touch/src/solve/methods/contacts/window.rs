@@ -17,7 +17,7 @@ use tactomo_touch_core::Motion;
 pub(super) use self::key_frames::{KeyFrame, KeyFrames};
 use super::discs::{DiscFit, Effort, STAYING, Still, among, place_m};
 use super::search::COLD;
-use super::{Certainty, ContactFinder, ContactHypothesis};
+use super::{Certainty, ContactFinder, ContactHypothesis, UNKNOWN_DETECTOR_SHARE};
 use crate::solve::compiled::MOST_CONTACTS;
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
@@ -57,6 +57,7 @@ impl ContactFinder {
         let frames = keys.iter().map(|key| self.noisy(key)).collect();
         let most = self.settings.most;
         let (best, by_count) = self.by_table(|compiled| Window { compiled, frames, most }.grown(&followed))?;
+        self.may_be(&best, keys.len()).then_some(())?;
         let contacts = best.contacts(keys.len() - 1);
         let about = self.about_steps(best.steps())?;
         let target = self.informed(target, &contacts, &about).unwrap_or_else(|| target.clone());
@@ -67,6 +68,19 @@ impl ContactFinder {
         let keys = from.keys.clone();
         let found = ContactHypothesis { certainty, keys, ..ContactHypothesis::of(fit, &target) };
         (!self.is_misfit(&found.fit, &target)).then_some(found)
+    }
+
+    /// Whether contacts are what they are called. What are not side by side are one that moves, or that is no disc; and one that is lighter against the firmest than
+    /// readings of a detector as built are off by may be what that differs by.
+    fn may_be(&self, found: &Together, frames: usize) -> bool {
+        let contacts = found.contacts(frames - 1);
+        let beside_m = |a: &Contact, b: &Contact| self.side_by_side_m().max(a.radius_m + b.radius_m);
+        let is_over = |a: &Contact, b: &Contact| space::distance(place_m(a), place_m(b)) < beside_m(a, b);
+        let are_apart = (0..contacts.len()).all(|k| !contacts[..k].iter().any(|other| is_over(&contacts[k], other)));
+        let unknown = self.problem.nuisance().map_or(0.0, |_| UNKNOWN_DETECTOR_SHARE);
+        let levels = levels(found, frames);
+        let [lightest, firmest] = [f64::min, f64::max].map(|of| levels.iter().copied().reduce(of).unwrap_or_default());
+        are_apart && lightest - firmest > unknown.ln()
     }
 
     /// A key frame with its noise, and that of the baseline.
