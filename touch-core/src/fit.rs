@@ -21,7 +21,7 @@ pub(crate) const LEAST_GAIN: f32 = 0.1;
 /// Damping at the start, shares of the diagonal, and how it changes with a step that is taken or not; steps tried from a place.
 const FIRST_DAMPING: f32 = 1e-3;
 const LEAST_DAMPING: f32 = 1e-5;
-const DAMPING_STEP: f32 = 10.0;
+pub(crate) const DAMPING_STEP: f32 = 10.0;
 pub(crate) const TRIES: u8 = 4;
 /// Steps at most where a start is only tried, and what a round of these, or of others, has to gain (squared deviations) for another one.
 pub(crate) const TRYING: u8 = 8;

@@ -30,7 +30,7 @@ const DAMPING_STEP: f32 = 10.0;
 const MOST_DAMPING: f32 = 1e4;
 /// What is left over noise (in its deviations) up to which it is noise, the least share of what was taken for noise in the round before, and how much less than that is
 /// worth another round.
-const NOISE: f32 = 1.3;
+pub(crate) const NOISE: f32 = 1.3;
 const LEAST_SHARE: f32 = 0.2;
 const WORTH: f32 = 0.8;
 /// What another round has to gain at least while much is left (squared deviations of that): where a contact is missing, the others need not be found exactly.

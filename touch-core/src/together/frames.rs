@@ -4,12 +4,12 @@
 use super::Together;
 use crate::answer::Contact;
 use crate::evidence::{known, limit, ln_volume};
-use crate::fit::LEAST_GAIN;
+use crate::fit::{DAMPING_STEP, LEAST_GAIN};
 use crate::frame::{Errors, Frame, left_v};
 use crate::normal::{ANY_RADIUS, Normal};
 use crate::products::dot;
 use crate::real::Real;
-use crate::round::On;
+use crate::round::{NOISE, On};
 use crate::solver::Task;
 use crate::table::Table;
 use crate::vector::{PARAMETERS, Vector};
@@ -17,13 +17,11 @@ use crate::vector::{PARAMETERS, Vector};
 /// Steps of a frame's own parameters at most, and what one has to gain (squared deviations): what is left of them is in the next pass.
 const OWN_STEPS: u8 = 3;
 const WORTH: f32 = 3.0 * LEAST_GAIN;
-/// Steps that are tried from a place, damping at the start, shares of the diagonal, and how it changes with a step that is taken or not.
+/// Steps that are tried from a place; damping at the start and at least, shares of the diagonal.
 const TRIES: u8 = 5;
 const FIRST_DAMPING: f32 = 1e-3;
 const LEAST_DAMPING: f32 = 1e-6;
-const DAMPING_STEP: f32 = 10.0;
-/// What is left over noise (in its deviations) up to which it is noise, and share by which what is taken for noise has to change to be taken anew.
-const NOISE: f32 = 1.3;
+/// Share by which what is taken for noise has to change to be taken anew.
 const CHANGED: f32 = 0.2;
 
 /// Frames that are explained together.

@@ -58,35 +58,19 @@ impl KeyFrame {
 }
 
 /// Key frames of what is followed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(in super::super) struct KeyFrames {
     kept: VecDeque<KeyFrame>,
-    /// How many came, how many of them since they were looked at, and how many are waited for.
+    /// How many came, how many of them since they were looked at, and how often that said nothing new.
     came: usize,
     new: usize,
-    waited_for: usize,
+    in_vain: usize,
     /// The first of the frames since the last one, as contacts are followed in it and what is read (V), their sum, what they say, and their number.
     first: Vec<Contact>,
     first_v: Vec<f64>,
     sum_v: Vec<f64>,
     says: Vec<Says>,
     frames: usize,
-}
-
-impl Default for KeyFrames {
-    fn default() -> Self {
-        Self {
-            kept: VecDeque::new(),
-            came: 0,
-            new: 0,
-            waited_for: WAITED_FOR[0],
-            first: Vec::new(),
-            first_v: Vec::new(),
-            sum_v: Vec::new(),
-            says: Vec::new(),
-            frames: 0,
-        }
-    }
 }
 
 impl KeyFrames {
@@ -96,7 +80,7 @@ impl KeyFrames {
         if self.kept.back().is_some_and(|last| last.contacts.len() != fit.contacts.len()) {
             // What touches is the same; how many contacts it is said to be is not.
             self.kept.iter_mut().for_each(|key| key.contacts.clone_from(&fit.contacts));
-            self.waited_for = WAITED_FOR[0];
+            self.in_vain = 0;
         }
         let readings = target.readings();
         if self.frames > 0 && self.have_changed(&readings, errors.noise_v) {
@@ -188,13 +172,13 @@ impl KeyFrames {
 
     /// Whether they are worth a look.
     pub fn are_ripe(&self) -> bool {
-        self.kept.len() >= FEWEST && self.new >= self.waited_for
+        self.kept.len() >= FEWEST && self.new >= (WAITED_FOR[0] + self.in_vain).min(WAITED_FOR[1])
     }
 
     /// They were looked at.
     pub fn looked_at(&mut self) {
         self.new = 0;
-        self.waited_for = (self.waited_for + 1).min(WAITED_FOR[1]);
+        self.in_vain += 1;
     }
 
     /// All of them.
