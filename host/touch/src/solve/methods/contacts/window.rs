@@ -18,7 +18,6 @@ pub(super) use self::key_frames::{KeyFrame, KeyFrames};
 use super::discs::{DiscFit, Effort, STAYING, Still, among, place_m};
 use super::search::COLD;
 use super::{Certainty, ContactFinder, ContactHypothesis, UNKNOWN_DETECTOR_SHARE};
-use crate::solve::compiled::MOST_CONTACTS;
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use crate::solve::methods::compiled::{Compiled, NoisyFrame, Together};
@@ -115,7 +114,7 @@ fn levels(found: &Together, frames: usize) -> Vec<f64> {
 }
 
 /// Contacts at their mean places, with mean radii and conductances, and by how much places of each differ (m).
-fn middle(frames: &[Vec<Contact>]) -> (Vec<Contact>, [f64; MOST_CONTACTS]) {
+fn middle<const N: usize>(frames: &[Vec<Contact>]) -> (Vec<Contact>, [f64; N]) {
     let count = frames.len() as f64;
     let mean = |k: usize, of: &dyn Fn(&Contact) -> f64| frames.iter().map(|all| of(&all[k])).sum::<f64>() / count;
     let of = |k: usize| Contact {
@@ -126,7 +125,7 @@ fn middle(frames: &[Vec<Contact>]) -> (Vec<Contact>, [f64; MOST_CONTACTS]) {
         conductance_s: mean(k, &|contact| contact.conductance_s.ln()).exp(),
     };
     let means: Vec<_> = (0..frames[0].len()).map(of).collect();
-    let mut spreads_m = [0.0; MOST_CONTACTS];
+    let mut spreads_m = [0.0; N];
     for (k, (spread_m, mean_at)) in spreads_m.iter_mut().zip(&means).enumerate() {
         let square_m2 = mean(k, &|contact| space::distance(place_m(contact), place_m(mean_at)).powi(2));
         *spread_m = (0.5 * square_m2).sqrt();
